@@ -58,9 +58,9 @@ data::Dataset measured(model::Model& model) {
   });
   for (plant::ExperimentPlan& e : demo.experiments) e.duration_s = 100.0;
   // Away from standstill an asymmetry of dry friction and a current offset are one constant; one of them is enough.
-  model = testing::model_of(demo.drive, false, false);
+  model = tests::model_of(demo.drive, false, false);
   std::erase_if(model.effects, [](const model::Effect& e) { return e.type == "coulomb_asymmetry"; });
-  return testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, 7001));
+  return tests::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, 7001));
 }
 
 // What the script needs of the measurement; both sides begin here.

@@ -12,16 +12,16 @@
 
 #include "tests/support/update_bench.hpp"
 
-namespace flexspline {
+namespace flexspline::boot_power_cut_test {
 namespace {
 
 using boot::Slot;
 using boot::Start;
-using testing::CutAt;
-using testing::PowerCut;
-using testing::SlotCells;
-using testing::SlotFlash;
-using testing::TestSlots;
+using tests::CutAt;
+using tests::PowerCut;
+using tests::SlotCells;
+using tests::SlotFlash;
+using tests::TestSlots;
 
 // What the application of an image does: confirms itself, or does not come so far.
 enum class Behaviour { does_well, hangs };
@@ -33,19 +33,19 @@ std::uint8_t name_of(const TestSlots& slots) {
   if (image.empty()) return 0;
   boot::ImageHeader header;
   EXPECT_EQ(boot::read_image(image, header), boot::ImageFinding::none);
-  EXPECT_TRUE(std::ranges::equal(image, testing::image_named(header.version.major)));
+  EXPECT_TRUE(std::ranges::equal(image, tests::image_named(header.version.major)));
   return header.version.major;
 }
 
 // A start of the boot loader and of the application that it finds, which confirms itself or hangs until the watchdog
 // resets the drive. Returns whether another start is due.
 bool run_once(SlotFlash& flash, Behaviour of_new, Start& start, std::uint8_t& name) {
-  TestSlots slots(flash, testing::kTestBoard);
+  TestSlots slots(flash, tests::kTestBoard);
   start = slots.resume();
   name = start == Start::none ? 0 : name_of(slots);
   if (start != Start::trial) return false;
   if (of_new == Behaviour::hangs && name == kNew) return true;
-  TestSlots application(flash, testing::kTestBoard);
+  TestSlots application(flash, tests::kTestBoard);
   if (application.on_trial()) application.confirm();
   return false;
 }
@@ -58,8 +58,8 @@ struct Case {
 };
 void install(SlotCells& cells, std::uint8_t name) {
   SlotFlash flash(cells);
-  TestSlots slots(flash, testing::kTestBoard);
-  ASSERT_TRUE(testing::download(slots, testing::image_named(name)));
+  TestSlots slots(flash, tests::kTestBoard);
+  ASSERT_TRUE(tests::download(slots, tests::image_named(name)));
   Start start{};
   std::uint8_t runs = 0;
   run_once(flash, Behaviour::does_well, start, runs);
@@ -83,8 +83,8 @@ const std::vector<Case>& cases() {
 
 // The whole update, from the download to an image that is confirmed or taken back. Throws PowerCut where it is cut.
 void update(SlotFlash& flash, const Case& c) {
-  TestSlots slots(flash, testing::kTestBoard);
-  ASSERT_TRUE(testing::download(slots, testing::image_named(kNew)));
+  TestSlots slots(flash, tests::kTestBoard);
+  ASSERT_TRUE(tests::download(slots, tests::image_named(kNew)));
   Start start{};
   std::uint8_t name = 0;
   for (int i = 0; i < 6 && run_once(flash, c.of_new, start, name); ++i) {
@@ -212,22 +212,22 @@ TEST(FirmwareUpdate, ADownloadThatIsCutTwiceCostsNothing) {
 TEST(FirmwareUpdate, EveryPowerCutLeavesASecurityCounterThatNeverFalls) {
   constexpr std::uint16_t kBefore = 0x0102, kAfter = 0x1234;
   const auto image = [](std::uint8_t name, std::uint16_t counter) {
-    return testing::image_named(name, 42, testing::kTestBoard, counter);
+    return tests::image_named(name, 42, tests::kTestBoard, counter);
   };
   // Starts until nothing is on trial, and once more, which raises the counter.
   const auto finish = [](SlotFlash& flash) {
     for (int i = 0; i < 3; ++i) {
-      TestSlots slots(flash, testing::kTestBoard);
+      TestSlots slots(flash, tests::kTestBoard);
       const Start start = slots.resume();
       ASSERT_NE(start, Start::none);
       if (start == Start::trial) {
-        ASSERT_TRUE(TestSlots(flash, testing::kTestBoard).confirm());
+        ASSERT_TRUE(TestSlots(flash, tests::kTestBoard).confirm());
       }
     }
   };
   const auto run = [&](SlotFlash& flash, std::uint8_t name, std::uint16_t counter) {
-    TestSlots slots(flash, testing::kTestBoard);
-    ASSERT_TRUE(testing::download(slots, image(name, counter)));
+    TestSlots slots(flash, tests::kTestBoard);
+    ASSERT_TRUE(tests::download(slots, image(name, counter)));
     finish(flash);
   };
   SlotCells prepared;
@@ -241,7 +241,7 @@ TEST(FirmwareUpdate, EveryPowerCutLeavesASecurityCounterThatNeverFalls) {
     SlotFlash flash(cells);
     run(flash, kNew, kAfter);
     operations = flash.operations();
-    EXPECT_EQ(TestSlots(flash, testing::kTestBoard).security_counter(), kAfter);
+    EXPECT_EQ(TestSlots(flash, tests::kTestBoard).security_counter(), kAfter);
   }
   std::size_t cuts = 0, raised = 0;
   for (const bool weakens : {false, true})
@@ -261,7 +261,7 @@ TEST(FirmwareUpdate, EveryPowerCutLeavesASecurityCounterThatNeverFalls) {
           std::uint16_t shown = 0;
           for (std::uint64_t start = 0; start < 4; ++start) {
             SlotFlash flash(cells, 100 * seed + start);
-            TestSlots slots(flash, testing::kTestBoard);
+            TestSlots slots(flash, tests::kTestBoard);
             const Start how = slots.resume();
             ASSERT_NE(how, Start::none) << at;
             const std::uint16_t counter = slots.security_counter();
@@ -275,9 +275,9 @@ TEST(FirmwareUpdate, EveryPowerCutLeavesASecurityCounterThatNeverFalls) {
           raised += shown == kAfter ? 1 : 0;
           SlotFlash flash(cells, seed);
           ASSERT_NO_FATAL_FAILURE(run(flash, kNext, kAfter)) << at;
-          ASSERT_EQ(TestSlots(flash, testing::kTestBoard).security_counter(), kAfter);
-          TestSlots slots(flash, testing::kTestBoard);
-          ASSERT_FALSE(testing::download(slots, image(kOld, kBefore))) << at;
+          ASSERT_EQ(TestSlots(flash, tests::kTestBoard).security_counter(), kAfter);
+          TestSlots slots(flash, tests::kTestBoard);
+          ASSERT_FALSE(tests::download(slots, image(kOld, kBefore))) << at;
         }
   std::printf("power cuts of an update with a larger counter: %zu, raised before or after %zu\n", cuts, raised);
   EXPECT_GT(cuts, 5000U);
@@ -307,4 +307,4 @@ TEST(FirmwareUpdate, AFirstInstallationThatIsCutEndsInTheNewImageOrWaitsForIt) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::boot_power_cut_test

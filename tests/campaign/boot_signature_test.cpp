@@ -9,7 +9,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/signature_cases.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::boot_signature_test {
 namespace {
 
 TEST(BootSignatureCampaign, LibsodiumJudgesSignaturesAsTheDriveDoes) {
@@ -29,4 +29,4 @@ TEST(BootSignatureCampaign, LibsodiumJudgesSignaturesAsTheDriveDoes) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::boot_signature_test

@@ -12,7 +12,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/interval_coverage.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::catalogue_intervals_test {
 namespace {
 
 constexpr std::uint64_t kFirstSeed = 9001;
@@ -102,4 +102,4 @@ TEST(CatalogueIntervals, OfAnAddedEffectAreThoseOfTheModelWithIt) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::catalogue_intervals_test

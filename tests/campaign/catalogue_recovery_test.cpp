@@ -17,7 +17,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::catalogue_recovery_test {
 namespace {
 
 struct Recovered {
@@ -61,9 +61,9 @@ Outcome recover(const std::string& label, std::uint64_t seed) {
   const auto size = kTimesUsual.find(type);
   plant::hide(demo.drive, label, size == kTimesUsual.end() ? 1.0 : size->second);
   const auto records = plant::record_all(demo.drive, demo.experiments, seed);
-  const data::Dataset dataset = testing::dataset_of(demo.drive, records);
-  const model::Model base = testing::model_of(demo.drive, false, false);
-  const model::Model truth = testing::model_of(demo.drive, true, true);
+  const data::Dataset dataset = tests::dataset_of(demo.drive, records);
+  const model::Model base = tests::model_of(demo.drive, false, false);
+  const model::Model truth = tests::model_of(demo.drive, true, true);
   const auto balance = catalogue::get(type).identified_on();
 
   std::vector<const data::Experiment*> fit, holdout;
@@ -206,7 +206,7 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
   std::vector<std::string> labels;
   for (const auto& effect : plant::demo_plant().drive.effects)
     if (effect.catalogue) labels.push_back(effect.label());
-  labels = testing::part_of(labels, 3);
+  labels = tests::part_of(labels, 3);
   const auto outcomes = recover_all(labels, 7001);
   print(outcomes);
   for (const Outcome& o : outcomes) {
@@ -248,4 +248,4 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::catalogue_recovery_test

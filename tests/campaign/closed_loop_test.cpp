@@ -18,7 +18,7 @@
 #include "hil/board/scenario.hpp"
 #include "hil/scenario/scenario_file.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::closed_loop_test {
 namespace {
 
 using board::Processor;
@@ -227,4 +227,4 @@ TEST_F(ProcessorInTheLoop, ATickOfAModelWithManyEffectsStaysWithinItsStackAndIts
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::closed_loop_test

@@ -10,7 +10,7 @@
 #include "tests/support/closed_loop_runs.hpp"
 #include "tests/support/commissioning_faults.hpp"
 
-namespace flexspline::commissioning_rig {
+namespace flexspline::commissioning_rig::commissioning_test {
 namespace {
 
 struct Errors {
@@ -38,8 +38,8 @@ std::vector<Bench> random_benches(std::size_t motors, std::uint64_t seed) {
 void check_motors(const char* what, std::size_t motors, motor::Fidelity fidelity, std::uint64_t seed) {
   const std::vector<Bench> benches = random_benches(motors, seed);
   std::vector<Outcome> outcomes(motors);
-  testing::on_all_cores(motors,
-                        [&](std::size_t k) { outcomes[k] = commission(benches[k], setup_of(benches[k]), fidelity); });
+  tests::on_all_cores(motors,
+                      [&](std::size_t k) { outcomes[k] = commission(benches[k], setup_of(benches[k]), fidelity); });
   Errors worst;
   double longest = 0.0, current = 0.0, travel = 0.0;
   for (std::size_t k = 0; k < motors; ++k) {
@@ -73,24 +73,24 @@ void check_motors(const char* what, std::size_t motors, motor::Fidelity fidelity
 }
 
 TEST(Commissioning, RandomMotorsAreMeasuredAndNoFaultIsSeen) {
-  check_motors("averaged", testing::in_campaign<std::size_t>(60, 200), motor::Fidelity::averaged, 5);
+  check_motors("averaged", tests::in_campaign<std::size_t>(60, 200), motor::Fidelity::averaged, 5);
 }
 TEST(Commissioning, OnTheSwitchedPowerStageItMeasuresTheSame) {
-  check_motors("switched", testing::in_campaign<std::size_t>(2, 20), motor::Fidelity::switched, 21);
-  check_motors("switched", testing::in_campaign<std::size_t>(1, 40), motor::Fidelity::switched, 8021);
+  check_motors("switched", tests::in_campaign<std::size_t>(2, 20), motor::Fidelity::switched, 21);
+  check_motors("switched", tests::in_campaign<std::size_t>(1, 40), motor::Fidelity::switched, 8021);
 }
 
 // A rotor with harmonics of the magnet's flux jumps from one place to the next while a current turns slowly. That is no
 // slipping encoder; the motor is measured, less exactly where it may stand at either side of a place.
 TEST(Commissioning, HarmonicsOfTheMagnetsFluxAreNoFault) {
-  const std::size_t motors = testing::in_campaign<std::size_t>(20, 200);
+  const std::size_t motors = tests::in_campaign<std::size_t>(20, 200);
   std::vector<Bench> benches = random_benches(motors, 337);
   for (std::size_t k = 0; k < motors; ++k) {
     benches[k].motor.harmonic_5 = k % 2 == 0 ? 0.06 : -0.06;
     benches[k].motor.harmonic_7 = 0.01;
   }
   std::vector<Outcome> outcomes(motors);
-  testing::on_all_cores(motors, [&](std::size_t k) { outcomes[k] = commission(benches[k], setup_of(benches[k])); });
+  tests::on_all_cores(motors, [&](std::size_t k) { outcomes[k] = commission(benches[k], setup_of(benches[k])); });
   std::size_t faults = 0, wide = 0;
   for (std::size_t k = 0; k < motors; ++k) {
     const Outcome& o = outcomes[k];
@@ -115,13 +115,13 @@ TEST(Commissioning, HarmonicsOfTheMagnetsFluxAreNoFault) {
 
 TEST(Commissioning, EveryFaultIsNamedAndNoneMistaken) {
   std::vector<FaultCase> cases;
-  const int each = testing::in_campaign(8, 50);
+  const int each = tests::in_campaign(8, 50);
   for (const Fault fault : kBenchFaults) {
     std::mt19937_64 random(100 + static_cast<std::uint64_t>(fault));
     for (int k = 0; k < each; ++k) cases.push_back(random_fault(fault, random));
   }
   std::vector<Outcome> outcomes(cases.size());
-  testing::on_all_cores(cases.size(), [&](std::size_t k) { outcomes[k] = commission(cases[k].bench, cases[k].setup); });
+  tests::on_all_cores(cases.size(), [&](std::size_t k) { outcomes[k] = commission(cases[k].bench, cases[k].setup); });
   int named = 0;
   for (std::size_t k = 0; k < cases.size(); ++k) {
     const auto& r = outcomes[k].result;
@@ -135,4 +135,4 @@ TEST(Commissioning, EveryFaultIsNamedAndNoneMistaken) {
 }
 
 }  // namespace
-}  // namespace flexspline::commissioning_rig
+}  // namespace flexspline::commissioning_rig::commissioning_test

@@ -11,7 +11,7 @@
 #include "firmware/fault_texts.hpp"
 #include "tests/support/closed_loop_runs.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::compensation_gain_test {
 namespace {
 
 constexpr std::uint64_t kFirstSeed = 9001;
@@ -78,4 +78,4 @@ TEST(CompensationGain, ParametersWrongByUpToThirtyPercentMakeNoDriveUnstable) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::compensation_gain_test

@@ -13,8 +13,9 @@
 
 #include "hil/board/drive_setup.hpp"
 #include "hil/board/scenario.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::controller_regression_test {
 namespace {
 
 using board::SoftwareBoard;
@@ -24,7 +25,6 @@ using firmware::N;
 constexpr std::uint32_t kTickHz = SoftwareBoard::kTickHz;
 constexpr std::uint32_t kTicksPerRow = kTickHz / 100, kBootTicks = 100, kHostTicks = kTickHz / 1000;
 constexpr std::size_t kRows = 130;
-constexpr double kTurn = 6.283185307179586;
 
 constexpr std::array<const char*, 5> kOutputs{"velocity", "disturbance", "feedforward_torque", "command_torque",
                                               "command_current"};
@@ -234,4 +234,4 @@ INSTANTIATE_TEST_SUITE_P(Recorded, Controller, testing::ValuesIn(kCases), [](con
 });
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::controller_regression_test

@@ -14,7 +14,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::detectable_test {
 namespace {
 
 // Seeds below 1100 were looked at while this was written.
@@ -24,8 +24,8 @@ std::uint64_t first_seed() {
 }
 
 selection::Diagnosis diagnosed(const plant::PlantFile& demo, std::uint64_t seed) {
-  const data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, seed));
-  return selection::diagnose(dataset, testing::model_of(demo.drive, false, false), {});
+  const data::Dataset dataset = tests::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, seed));
+  return selection::diagnose(dataset, tests::model_of(demo.drive, false, false), {});
 }
 
 const selection::Candidate* candidate(const selection::Diagnosis& d, const std::string& effect) {
@@ -92,10 +92,10 @@ Shown shown(const std::string& label, const selection::Diagnosis& demos, std::ui
 // takes them up, and the size that is said for them does not count with that (host/engine/selection/METHOD.md).
 TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
   const std::vector<std::string> labels =
-      testing::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",
-                        "power_law_friction", "gravity", "current_offset", "torque_ripple:2",
-                        "torque_constant_saturation", "cubic_stiffness", "backlash", "quadratic_drag"},
-                       4, 2);
+      tests::part_of({"viscous_asymmetry", "coulomb_asymmetry", "stribeck_gaussian", "load_dependent_friction",
+                      "power_law_friction", "gravity", "current_offset", "torque_ripple:2",
+                      "torque_constant_saturation", "cubic_stiffness", "backlash", "quadratic_drag"},
+                     4, 2);
   constexpr int kSeeds = 1;
   const selection::Diagnosis demos = diagnosed(plant::demo_plant(), first_seed());
   std::vector<Shown> all(labels.size());
@@ -121,4 +121,4 @@ TEST(Detectable, EffectsHalfAsLargeAgainAreNamedAndAThirdOfThemAreNot) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::detectable_test

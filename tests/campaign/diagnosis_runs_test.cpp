@@ -9,7 +9,7 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/add_until_complete.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::diagnosis_runs_test {
 namespace {
 
 using data::Column;
@@ -126,4 +126,4 @@ TEST(Needless, IsTheEffectThatTheDataDoNotShow) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::diagnosis_runs_test

@@ -14,12 +14,12 @@
 #include "host/engine/selection/disturbances.hpp"
 #include "tests/support/plain_model.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::diagnosis_search_test {
 namespace {
 
 using data::Column;
 using estimation::Balance;
-using testing::plain_model;
+using tests::plain_model;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInertia = 1e-3, kViscous = 4e-3, kCoulomb = 0.05;
@@ -341,4 +341,4 @@ TEST(Diagnose, APushIsListedWithItsUnitAndNamesNothing) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::diagnosis_search_test

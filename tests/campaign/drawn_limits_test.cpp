@@ -12,7 +12,7 @@
 #include "tests/support/limit_trial.hpp"
 #include "tests/support/on_all_cores.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::drawn_limits_test {
 namespace {
 
 std::size_t number_in(const char* variable, std::size_t otherwise) {
@@ -22,9 +22,9 @@ std::size_t number_in(const char* variable, std::size_t otherwise) {
 
 TEST(DrawnLimits, ActWhereTheValidatorTakesThem) {
   const std::size_t first = number_in("FLEXSPLINE_FIRST_SEED", 0);
-  const std::size_t seeds = number_in("FLEXSPLINE_SEEDS", testing::in_campaign(2'000, 180'000));
+  const std::size_t seeds = number_in("FLEXSPLINE_SEEDS", tests::in_campaign(2'000, 180'000));
   std::atomic<int> accepted = 0;
-  testing::on_all_cores(seeds, [&](std::size_t i) {
+  tests::on_all_cores(seeds, [&](std::size_t i) {
     const std::size_t seed = first + i;
     std::mt19937_64 random(seed);
     const auto setup = drawn_limits(random);
@@ -39,4 +39,4 @@ TEST(DrawnLimits, ActWhereTheValidatorTakesThem) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::drawn_limits_test

@@ -11,7 +11,7 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 
-namespace flexspline {
+namespace flexspline::emps_axis_test {
 namespace {
 
 std::filesystem::path emps_folder() {
@@ -145,4 +145,4 @@ TEST_F(EmpsAxis, ForcePulsesAreDisturbancesAndNoFriction) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::emps_axis_test

@@ -10,7 +10,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/noisy_motor.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::estimators_test {
 namespace {
 
 using estimation::Method;
@@ -122,4 +122,4 @@ TEST(Estimators, IntervalsOfTheFreeRunCoverNoLess) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::estimators_test

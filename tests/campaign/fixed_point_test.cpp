@@ -7,10 +7,10 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/drive_trial.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::fixed_point_test {
 namespace {
 
-const int kBlocks = testing::in_campaign(100, 300);
+const int kBlocks = tests::in_campaign(100, 300);
 constexpr double kBoundOfAnEffect = 1e-6;  // of rated torque
 
 TEST(FixedPoint, EachEffectIsWithinAMillionthOfRatedTorqueOverTheEnvelope) {
@@ -130,4 +130,4 @@ INSTANTIATE_TEST_SUITE_P(Laws, SlowHysteresis,
                          [](const auto& at) { return at.param; });
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::fixed_point_test

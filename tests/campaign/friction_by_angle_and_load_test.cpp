@@ -9,7 +9,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::friction_by_angle_and_load_test {
 namespace {
 
 using Experiments = std::vector<plant::ExperimentPlan>;
@@ -37,8 +37,8 @@ Outcome diagnose(const std::string& hidden, const Experiments& experiments, doub
       if (e.type == "gravity") e.parameter("sine").value = arm_nm;
   }
   plant::hide(drive, hidden);
-  const data::Dataset dataset = testing::dataset_of(drive, plant::record_all(drive, experiments, seed));
-  const model::Model base = testing::model_of(drive, false, false);
+  const data::Dataset dataset = tests::dataset_of(drive, plant::record_all(drive, experiments, seed));
+  const model::Model base = tests::model_of(drive, false, false);
   Outcome outcome;
   const selection::Diagnosis d = selection::diagnose(dataset, base, {});
   for (const auto& n : d.named)
@@ -46,7 +46,7 @@ Outcome diagnose(const std::string& hidden, const Experiments& experiments, doub
   for (std::size_t i = 0; i < std::min<std::size_t>(5, d.candidates.size()); ++i)
     outcome.detail += fmt::format(" {}({:.0f},{:.2f}%{})", d.candidates[i].effect, d.candidates[i].score,
                                   d.candidates[i].chi2_decrease_percent, d.candidates[i].admissible ? "" : ",x");
-  const double floor = held_out_floor(dataset, testing::model_of(drive, true, true));
+  const double floor = held_out_floor(dataset, tests::model_of(drive, true, true));
   const selection::Addition added = selection::add(dataset, base, drive.hidden(), {});
   outcome.before = *added.before.rmse_holdout / floor;
   outcome.after = *added.after.rmse_holdout / floor;
@@ -81,7 +81,7 @@ constexpr double kArmNm = 20.0;
 
 TEST(FrictionByAngle, IsNamedWithItsOrder) {
   const Experiments experiments = plant::demo_plant().experiments;
-  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
+  for (std::uint64_t seed = 7001; seed <= tests::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("angle_dependent_friction:2", experiments, 0.0, seed);
     EXPECT_EQ(o.named, "angle_dependent_friction:2");
     EXPECT_GT(o.before, 1.3);
@@ -91,7 +91,7 @@ TEST(FrictionByAngle, IsNamedWithItsOrder) {
 
 // What BAM's models M3 and M4 and measured gears have: a law for each load, and one that falls with speed as well.
 TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
-  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
+  for (std::uint64_t seed = 7001; seed <= tests::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("load_dependent_stiction", with_swings(), kArmNm, seed);
     EXPECT_EQ(o.named, "load_dependent_stiction");
     EXPECT_GT(o.before, 1.3);
@@ -100,7 +100,7 @@ TEST(FrictionByLoad, StictionThatGrowsWithTheLoadIsNamed) {
 }
 
 TEST(FrictionByLoad, LossThatDiffersBetweenDrivingAndDrivenIsNamed) {
-  for (std::uint64_t seed = 7001; seed <= testing::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
+  for (std::uint64_t seed = 7001; seed <= tests::in_campaign<std::uint64_t>(7001, 7002); ++seed) {
     const Outcome o = diagnose("driving_dependent_loss", with_swings(), kArmNm, seed);
     EXPECT_EQ(o.named, "driving_dependent_loss");
     EXPECT_GT(o.before, 1.3);
@@ -115,4 +115,4 @@ TEST(FrictionByLoad, FrictionInProportionToTheLoadKeepsItsName) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::friction_by_angle_and_load_test

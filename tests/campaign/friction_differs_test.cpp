@@ -14,17 +14,17 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/hidden_twin.hpp"
 
-namespace flexspline {
+namespace flexspline::friction_differs_test {
 namespace {
 
-using testing::HiddenTwin;
-using testing::names;
+using tests::HiddenTwin;
+using tests::names;
 
 constexpr double kVariation = 0.03;
 
 // In the whole campaign two.
 std::vector<std::uint64_t> seeds_from(std::uint64_t first) {
-  return testing::whole_campaigns() ? std::vector<std::uint64_t>{first, first + 100} : std::vector{first};
+  return tests::whole_campaigns() ? std::vector<std::uint64_t>{first, first + 100} : std::vector{first};
 }
 
 // Largest error of the hidden effect's parameters after it was added, over the truth; the two parts of a wave over its
@@ -117,4 +117,4 @@ TEST(FrictionThatDiffers, DoesNotMakeASmearedDahlLawALugre) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::friction_differs_test

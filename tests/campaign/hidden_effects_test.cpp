@@ -16,11 +16,11 @@
 #include "tests/support/campaign_statistics.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::hidden_effects_test {
 namespace {
 
-using testing::in_campaign;
-using testing::part_of;
+using tests::in_campaign;
+using tests::part_of;
 
 struct Case {
   std::string hidden;  // empty: nothing is
@@ -55,8 +55,8 @@ Outcome run(const Case& c) {
   demo.drive.sensors.current.correlation = c.noise_correlation;
   demo.drive.sensors.torque.correlation = c.noise_correlation;
   const auto records = plant::record_all(demo.drive, demo.experiments, c.seed);
-  const data::Dataset dataset = testing::dataset_of(demo.drive, records);
-  const model::Model base = testing::model_of(demo.drive, false, false);
+  const data::Dataset dataset = tests::dataset_of(demo.drive, records);
+  const model::Model base = tests::model_of(demo.drive, false, false);
   const selection::Diagnosis d = selection::diagnose(dataset, base, {});
   outcome.verdict = selection::verdict_name(d.verdict);
   for (const auto& n : d.named) outcome.named += (outcome.named.empty() ? "" : "+") + label(n.effect, n.order);
@@ -73,7 +73,7 @@ Outcome run(const Case& c) {
   outcome.right = outcome.named == truth;
   // The floor: the residual of the true model with its true parameters, through the same pipeline.
   const selection::Addition added = selection::add(dataset, base, truth, {});
-  const model::Model true_model = testing::model_of(demo.drive, true, true);
+  const model::Model true_model = tests::model_of(demo.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, true_model, {});
@@ -174,7 +174,7 @@ std::ptrdiff_t false_names(std::uint64_t first_seed, std::uint64_t drives, doubl
   const auto outcomes = run_all(cases);
   print(outcomes);
   const auto wrong = std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return !o.right; });
-  const testing::Interval rate = testing::exact_interval(static_cast<std::size_t>(wrong), outcomes.size());
+  const tests::Interval rate = tests::exact_interval(static_cast<std::size_t>(wrong), outcomes.size());
   fmt::print("false names: {} of {}; 95 % interval of the rate {:.2f} to {:.2f} %\n", wrong, outcomes.size(),
              100.0 * rate.low, 100.0 * rate.high);
   return wrong;
@@ -194,4 +194,4 @@ TEST(HiddenEffects, NothingIsNamedInColouredNoise) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::hidden_effects_test

@@ -16,7 +16,7 @@
 #include "host/input/data/findings.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
-namespace flexspline {
+namespace flexspline::honest_data_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -201,4 +201,4 @@ TEST_F(HonestData, AnOrderIsNamedFromAFewTurnsOnlyWhereTheWholeMeasurementHasThe
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::honest_data_test

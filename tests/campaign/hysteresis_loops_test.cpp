@@ -16,7 +16,7 @@
 #include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::hysteresis_loops_test {
 namespace {
 
 constexpr double kSample = 1e-3;  // s
@@ -275,4 +275,4 @@ TEST_P(Law, IsToldFromTheOthersUpToThoseThatContainIt) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::hysteresis_loops_test

@@ -13,7 +13,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::intervals_test {
 namespace {
 
 struct Coverage {
@@ -39,11 +39,11 @@ std::map<std::string, Coverage> over_seeds(double friction_variation, const std:
   if (!added.empty()) plant::hide(demo.drive, added, 1.0);
   std::erase_if(demo.experiments, [](const plant::ExperimentPlan& e) { return e.holdout; });
   for (plant::ExperimentPlan& e : demo.experiments) e.duration_s = 6.0;
-  truth = truth_of(testing::model_of(demo.drive, true, true));
+  truth = truth_of(tests::model_of(demo.drive, true, true));
   estimation::in_parallel(seeds, [&](std::size_t s) {
     const auto records = plant::record_all(demo.drive, demo.experiments, 7001 + s);
-    const data::Dataset dataset = testing::dataset_of(demo.drive, records);
-    const model::Model model = testing::model_of(demo.drive, false, false);
+    const data::Dataset dataset = tests::dataset_of(demo.drive, records);
+    const model::Model model = tests::model_of(demo.drive, false, false);
     found[s] = added.empty() ? estimation::identify(dataset, model, {})->estimates
                              : selection::add(dataset, model, added, {}).estimates;
   });
@@ -99,8 +99,8 @@ TEST(Intervals, AreHardlyWiderWhereFrictionIsTheSameInAllRecords) {
 TEST(Intervals, OfAnAddedEffectHoldWhereFrictionDiffersToo) {
   // At most 3 of 24 intervals outside, in the whole campaign 5 of 48: of intervals that hold the truth with 95 % more
   // are outside in 3 % of all such runs.
-  const auto sets = testing::in_campaign<std::size_t>(12, 24);
-  const double least = testing::in_campaign(0.87, 0.88);
+  const auto sets = tests::in_campaign<std::size_t>(12, 24);
+  const double least = tests::in_campaign(0.87, 0.88);
   const auto coverage = over_seeds(0.03, "stribeck_gaussian", sets);
   EXPECT_GE(together(coverage, kFriction), least);
   EXPECT_GE(together(coverage, {"stribeck_gaussian.amplitude_positive", "stribeck_gaussian.amplitude_negative"}),
@@ -108,4 +108,4 @@ TEST(Intervals, OfAnAddedEffectHoldWhereFrictionDiffersToo) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::intervals_test

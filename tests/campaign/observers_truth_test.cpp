@@ -13,15 +13,15 @@
 
 #include "hil/board/drive_setup.hpp"
 #include "hil/board/scenario.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::observers_truth_test {
 namespace {
 
 using board::SoftwareBoard;
 using firmware::Channel;
 using firmware::N;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr std::uint32_t kTickHz = SoftwareBoard::kTickHz;
 constexpr double kTickS = 1.0 / kTickHz;
 
@@ -202,4 +202,4 @@ TEST(ObserversAndTruth, DisturbanceThatNoModelKnows) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::observers_truth_test

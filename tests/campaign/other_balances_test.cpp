@@ -12,12 +12,12 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/hidden_twin.hpp"
 
-namespace flexspline {
+namespace flexspline::other_balances_test {
 namespace {
 
-using testing::HiddenTwin;
-using testing::in_campaign;
-using testing::names;
+using tests::HiddenTwin;
+using tests::in_campaign;
+using tests::names;
 
 constexpr std::uint64_t kFirstSeed = 9100;
 
@@ -91,4 +91,4 @@ TEST(OtherBalances, GiveTheWaveOfTheGearItsPhase) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::other_balances_test

@@ -9,7 +9,7 @@
 #include "host/drive_link/deployment/pack.hpp"
 #include "tests/support/random_model.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::pack_test {
 namespace {
 
 using deployment::PackError;
@@ -77,4 +77,4 @@ TEST(PackedModels, NoneOfAMillionDirectedSamplesLeavesItsProof) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::pack_test

@@ -17,7 +17,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::planning_test {
 namespace {
 
 // Seeds below 1100 were looked at while this was written.
@@ -73,8 +73,8 @@ PlannedCase plan_and_record(const Pair& pair, bool first_is_true, std::uint64_t 
   plant::PlantFile demo = plant::demo_plant();
   for (const std::string& effect : {pair.first, pair.second}) plant::without(demo.drive, effect);
   plant::hide(demo.drive, result.truth, first_is_true ? pair.size_of_first : pair.size_of_second);
-  data::Dataset dataset = testing::dataset_of(demo.drive, plant::record_all(demo.drive, pair.recorded, seed));
-  const model::Model base = testing::model_of(demo.drive, false, false);
+  data::Dataset dataset = tests::dataset_of(demo.drive, plant::record_all(demo.drive, pair.recorded, seed));
+  const model::Model base = tests::model_of(demo.drive, false, false);
   const std::string& other = first_is_true ? pair.second : pair.first;
   const selection::Diagnosis before = selection::diagnose(dataset, base, {});
   result.before = named(before);
@@ -102,7 +102,7 @@ PlannedCase plan_and_record(const Pair& pair, bool first_is_true, std::uint64_t 
     return result;
   }
   for (const data::Experiment& e :
-       testing::dataset_of(demo.drive, plant::record_all(demo.drive, runs, seed + 50)).experiments)
+       tests::dataset_of(demo.drive, plant::record_all(demo.drive, runs, seed + 50)).experiments)
     dataset.experiments.push_back(e);
   const selection::Diagnosis after = selection::diagnose(dataset, base, {});
   result.after = named(after);
@@ -183,7 +183,7 @@ TEST(Planning, TheMotionPlannedForTwoEffectsTellsThemApart) {
   for (std::size_t i = 0; i < kPairs.size(); ++i)
     for (const bool first : {true, false}) {
       // One of the two by turns; in the whole campaign both.
-      if (first == (i % 2 == 0) || testing::whole_campaigns()) cases.push_back({&kPairs[i], first});
+      if (first == (i % 2 == 0) || tests::whole_campaigns()) cases.push_back({&kPairs[i], first});
     }
   std::vector<PlannedCase> all(cases.size());
   std::atomic<std::size_t> next{0};
@@ -213,4 +213,4 @@ TEST(Planning, TheMotionPlannedForTwoEffectsTellsThemApart) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::planning_test

@@ -14,7 +14,7 @@
 #include "hil/plant/recorder.hpp"
 #include "tests/support/campaign_size.hpp"
 
-namespace flexspline::plant {
+namespace flexspline::plant::plant_convergence_test {
 namespace {
 
 constexpr double kShareOfNoise = 0.1;
@@ -126,7 +126,7 @@ TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCa
   EXPECT_LT(worst.output, kShareOfCount);
 }
 
-INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::part_of(hidden_effects(), 4)),
+INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(tests::part_of(hidden_effects(), 4)),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::replace_if(
@@ -135,4 +135,4 @@ INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(testing::
                          });
 
 }  // namespace
-}  // namespace flexspline::plant
+}  // namespace flexspline::plant::plant_convergence_test

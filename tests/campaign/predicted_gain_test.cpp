@@ -15,7 +15,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/closed_loop_runs.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::predicted_gain_test {
 namespace {
 
 constexpr std::uint64_t kFirstSeed = 9601;
@@ -130,4 +130,4 @@ TEST(PredictedGain, DrawsDrivesThatCanBe) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::predicted_gain_test

@@ -8,15 +8,15 @@
 #include <vector>
 
 #include "host/engine/selection/diagnosis.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::recorded_signals_test {
 namespace {
 
 using data::Column;
 
-constexpr double kTurn = 6.283185307179586;
 constexpr double kRatio = 80.0;
 
 // How the drives of a test differ.
@@ -61,7 +61,7 @@ data::Dataset recorded(const Drive& drive) {
                                         drive.mu * std::abs(load) / kRatio * sign + 1e-3 * noise(random));
       if (drive.logs_load) e[Column::load_torque].push_back(load);
     };
-    dataset.experiments.push_back(testing::written_experiment("record-" + std::to_string(r + 1), 4e-3, 5000, fill));
+    dataset.experiments.push_back(tests::written_experiment("record-" + std::to_string(r + 1), 4e-3, 5000, fill));
   }
   return dataset;
 }
@@ -79,7 +79,7 @@ TEST(Temperature, ThatFewRecordsGoWithIsNamedWithItsCoefficient) {
     drive.temperature = {24.0, 27.0, 30.0, 33.0, 36.0};
     for (std::size_t r = 0; r < drive.viscous.size(); ++r)
       drive.viscous[r] = std::exp(-kB * (drive.temperature[r] - 30.0)) * (1.0 + 0.01 * std::pow(-1.0, r));
-    const Diagnosis d = diagnose(recorded(drive), testing::plain_model(), {});
+    const Diagnosis d = diagnose(recorded(drive), tests::plain_model(), {});
     if (!names(d, "temperature_viscous")) continue;
     ++named;
     EXPECT_NEAR(d.candidates.front().parameters.front().value, kB, 0.3 * kB) << seed;
@@ -94,7 +94,7 @@ TEST(Temperature, ThatRisesWhileFrictionDiffersForOtherReasonsIsNotNamed) {
     Drive drive;
     drive.temperature = {24.0, 27.0, 30.0, 33.0, 36.0};
     drive.viscous = viscous;
-    const Diagnosis d = diagnose(recorded(drive), testing::plain_model(), {});
+    const Diagnosis d = diagnose(recorded(drive), tests::plain_model(), {});
     EXPECT_FALSE(names(d, "temperature_viscous")) << viscous[1];
   }
 }
@@ -106,9 +106,9 @@ TEST(LoadDependentFriction, IsNamedWhereTheLoadIsLoggedAndThereIsNoTorqueSensor)
     drive.mu = 0.15;
     drive.load_nm = 12.0;
     drive.logs_load = true;
-    EXPECT_TRUE(names(diagnose(recorded(drive), testing::plain_model(), {}), "load_dependent_friction")) << seed;
+    EXPECT_TRUE(names(diagnose(recorded(drive), tests::plain_model(), {}), "load_dependent_friction")) << seed;
     drive.mu = 0.0;
-    EXPECT_TRUE(diagnose(recorded(drive), testing::plain_model(), {}).named.empty()) << seed;
+    EXPECT_TRUE(diagnose(recorded(drive), tests::plain_model(), {}).named.empty()) << seed;
   }
 }
 
@@ -127,7 +127,7 @@ TEST(HeldOutRecords, RefuseAnEffectWithWhichTheirErrorRises) {
       e.role = data::Role::holdout;
       dataset.experiments.push_back(std::move(e));
     }
-    const Diagnosis d = diagnose(dataset, testing::plain_model(), {});
+    const Diagnosis d = diagnose(dataset, tests::plain_model(), {});
     EXPECT_EQ(names(d, "quadratic_drag"), has_drag);
     if (has_drag) continue;
     const auto drag = std::find_if(d.candidates.begin(), d.candidates.end(),
@@ -138,4 +138,4 @@ TEST(HeldOutRecords, RefuseAnEffectWithWhichTheirErrorRises) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::recorded_signals_test

@@ -8,7 +8,7 @@
 #include "tests/support/closed_loop_runs.hpp"
 #include "tests/support/sensor_fault_cells.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::sensor_fault_matrix_test {
 namespace {
 
 constexpr double kOver = 1.1;  // of the overspeed limit, for the true shaft
@@ -16,10 +16,10 @@ constexpr double kOver = 1.1;  // of the overspeed limit, for the true shaft
 TEST(SensorFaultMatrix, TheTrueSpeedNeverExceedsTheOverspeedLimitByMoreThanATenth) {
   const double limit = kOver * demo_setup().safety.overspeed;
   const Block with = demo_block(cell_setup(true)), without = demo_block(cell_setup(false));
-  const auto cells = testing::whole_campaigns() ? all_cells({0.0, 0.01, 0.025, 0.05, 0.1, 0.225, 0.5, 1.0})
-                                                : all_cells({0.0, 0.025, 0.225, 1.0});
+  const auto cells = tests::whole_campaigns() ? all_cells({0.0, 0.01, 0.025, 0.05, 0.1, 0.225, 0.5, 1.0})
+                                              : all_cells({0.0, 0.025, 0.225, 1.0});
   std::vector<SensorFaultOutcome> outcomes(cells.size());
-  testing::on_all_cores(
+  tests::on_all_cores(
       cells.size(), [&](std::size_t i) { outcomes[i] = run_cell(cells[i], cells[i].output_encoder ? with : without); });
   struct Row {
     int cells = 0, over = 0, unseen = 0, silent = 0, alarms = 0;
@@ -75,4 +75,4 @@ TEST(SensorFaultMatrix, TheTrueSpeedNeverExceedsTheOverspeedLimitByMoreThanATent
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::sensor_fault_matrix_test

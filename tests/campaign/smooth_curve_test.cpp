@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::smooth_curve_test {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
@@ -190,4 +190,4 @@ TEST(SmoothCurve, DrawsOnFromNeighboursWhereNoRowLies) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::smooth_curve_test

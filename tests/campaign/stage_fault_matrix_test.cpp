@@ -9,7 +9,7 @@
 #include "tests/support/on_all_cores.hpp"
 #include "tests/support/stage_fault_cells.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::stage_fault_matrix_test {
 namespace {
 
 constexpr double kOver = 1.1;  // of the overspeed limit, for the true shaft
@@ -70,11 +70,11 @@ TEST(StageFaultMatrix, OpensTheSwitchesInTheStatedTimeNamesTheFaultAndKeepsSpeed
   const double most_rad_s = kOver * demo_setup().safety.overspeed;
   const firmware::ThreePhaseSettings settings = board::three_phase_settings_of(demo_drive());
   const double most_a = std::ldexp(settings.most_phase, -27) * board::three_phase_of(demo_drive()).sensors.full_scale_a;
-  const auto cells = testing::whole_campaigns() ? stage_cells({0.0, 0.02, 0.1, 0.25, 0.5, 1.0}, {7, 11, 19, 23})
-                                                : stage_cells({0.0, 0.1, 0.5}, {7});
+  const auto cells = tests::whole_campaigns() ? stage_cells({0.0, 0.02, 0.1, 0.25, 0.5, 1.0}, {7, 11, 19, 23})
+                                              : stage_cells({0.0, 0.1, 0.5}, {7});
   const Block block = demo_block(cell_setup(true));
   std::vector<StageFaultOutcome> outcomes(cells.size());
-  testing::on_all_cores(cells.size(), [&](std::size_t i) { outcomes[i] = StageFaultRun(cells[i], block).run(0.5); });
+  tests::on_all_cores(cells.size(), [&](std::size_t i) { outcomes[i] = StageFaultRun(cells[i], block).run(0.5); });
   // The cells of each fault are in one order.
   const std::size_t each = cells.size() / stage_faults().size();
   std::size_t coasting = 0;
@@ -130,4 +130,4 @@ TEST(StageFaultMatrix, WithoutABrakeResistorRegenerationEndsInBusHighBelowTheSta
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::stage_fault_matrix_test

@@ -13,23 +13,23 @@
 #include "tests/support/flash_model.hpp"
 #include "tests/support/write_once_model.hpp"
 
-namespace flexspline {
+namespace flexspline::store_weak_bits_test {
 namespace {
 
 using storage::StoreError;
-using testing::CutAt;
-using testing::PowerCut;
+using tests::CutAt;
+using tests::PowerCut;
 using Bytes = std::vector<std::uint8_t>;
 // Bits that are programmed one by one, and double words that are written once.
 struct Bits {
   static constexpr std::size_t kSector = 320;
-  using Cells = testing::FlashCells<kSector>;
-  using Flash = testing::FlashModel<kSector>;
+  using Cells = tests::FlashCells<kSector>;
+  using Flash = tests::FlashModel<kSector>;
 };
 struct DoubleWords {
   static constexpr std::size_t kSector = 576;
-  using Cells = testing::OnceCells<kSector>;
-  using Flash = testing::OnceFlash<kSector>;
+  using Cells = tests::OnceCells<kSector>;
+  using Flash = tests::OnceFlash<kSector>;
 };
 
 Bytes block_named(std::uint8_t name) {
@@ -106,7 +106,7 @@ class History {
 
 template <class Memory>
 void cut_histories(const char* memory) {
-  const std::size_t wanted = testing::in_campaign<std::size_t>(200'000, 1'000'000);
+  const std::size_t wanted = tests::in_campaign<std::size_t>(200'000, 1'000'000);
   std::size_t cuts = 0;
   std::uint64_t seed = 0;
   for (; cuts < wanted;) {
@@ -126,4 +126,4 @@ TEST(StoreWithWeakBits, LosesNothingButTheOperationThatWasCutInAMemoryOfDoubleWo
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::store_weak_bits_test

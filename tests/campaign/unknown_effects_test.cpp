@@ -18,7 +18,7 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::unknown_effects_test {
 namespace {
 
 struct Truth {
@@ -46,9 +46,8 @@ struct Outcome {
 // nothing, on the same motions with the same noise.
 double floor_of(const plant::PlantFile& demo, std::uint64_t seed) {
   plant::PlantFile plain = demo;
-  const data::Dataset dataset =
-      testing::dataset_of(plain.drive, plant::record_all(plain.drive, plain.experiments, seed));
-  const model::Model truth = testing::model_of(plain.drive, true, true);
+  const data::Dataset dataset = tests::dataset_of(plain.drive, plant::record_all(plain.drive, plain.experiments, seed));
+  const model::Model truth = tests::model_of(plain.drive, true, true);
   std::vector<const data::Experiment*> fit, holdout;
   for (const auto& e : dataset.experiments) (e.role == data::Role::holdout ? holdout : fit).push_back(&e);
   const estimation::PreparedData prepared = estimation::prepare(fit, truth, {});
@@ -64,9 +63,8 @@ Outcome run(const Case& c) {
   plant::PlantFile demo = plant::demo_plant();
   const double floor = floor_of(demo, c.seed);
   if (!c.truth.hidden.empty()) plant::hide(demo.drive, c.truth.hidden, c.truth.scale);
-  const data::Dataset dataset =
-      testing::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, c.seed));
-  const model::Model base = testing::model_of(demo.drive, false, false);
+  const data::Dataset dataset = tests::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, c.seed));
+  const model::Model base = tests::model_of(demo.drive, false, false);
   const selection::Diagnosis d = selection::diagnose(dataset, base, {});
   outcome.verdict = selection::verdict_name(d.verdict);
   bool of_class = !d.named.empty();
@@ -124,12 +122,12 @@ std::vector<Truth> truths(double scale) {
 // Seeds from 7001 on test; limits were set on seeds below 1100.
 TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheErrorToTheFloor) {
   std::vector<Case> cases;
-  const std::uint64_t seeds = testing::in_campaign(1, 2);
+  const std::uint64_t seeds = tests::in_campaign(1, 2);
   for (std::uint64_t seed = 7001; seed < 7001 + seeds; ++seed)
     for (const Truth& t : truths(1.0)) {
       // Three have a relative in the catalogue, whose name is given: one of them, in the whole campaign all.
       const bool is_another = t.hidden == "load_power_friction" || t.hidden == "triangle_ripple";
-      if (!is_another || testing::whole_campaigns()) cases.push_back({t, seed});
+      if (!is_another || tests::whole_campaigns()) cases.push_back({t, seed});
     }
   const std::vector<Outcome> outcomes = run_all(cases);
   int found = 0, flagged = 0, right_signal = 0;
@@ -156,7 +154,7 @@ TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheEr
 
 TEST(UnknownEffects, AreNotSeenWhereNothingIsMissing) {
   std::vector<Case> cases;
-  for (std::uint64_t seed = 7003; seed <= testing::in_campaign<std::uint64_t>(7003, 7004); ++seed)
+  for (std::uint64_t seed = 7003; seed <= tests::in_campaign<std::uint64_t>(7003, 7004); ++seed)
     cases.push_back({{}, seed});
   for (const Outcome& o : run_all(cases)) {
     EXPECT_FALSE(o.flagged) << o.what.seed << " " << o.curve;
@@ -180,4 +178,4 @@ TEST(UnknownEffects, TuningSeeds) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::unknown_effects_test

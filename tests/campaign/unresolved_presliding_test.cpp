@@ -6,7 +6,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/swinging_axis.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::unresolved_presliding_test {
 namespace {
 
 // Terms that subsamples found, or left open, that are presliding.
@@ -18,8 +18,8 @@ std::vector<Resampling::FoundTerm> presliding_of(const std::vector<Resampling::F
 }
 
 TEST(UnresolvedPresliding, ThatSubsamplesChooseWithATravelOfAFewEncoderStepsIsLeftOpenAsTheAxisMayStick) {
-  const data::Dataset dataset = testing::swinging_axis(0.02, 0.006);
-  const auto fitted = estimation::identify(dataset, testing::plain_model(), {});
+  const data::Dataset dataset = tests::swinging_axis(0.02, 0.006);
+  const auto fitted = estimation::identify(dataset, tests::plain_model(), {});
   const std::vector<const data::Experiment*> all = {&dataset.experiments[0], &dataset.experiments[1]};
   const Resampling hidden = resample(all, fitted->model.drive, fitted->terms);
   EXPECT_TRUE(presliding_of(hidden.found).empty());
@@ -29,4 +29,4 @@ TEST(UnresolvedPresliding, ThatSubsamplesChooseWithATravelOfAFewEncoderStepsIsLe
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::unresolved_presliding_test

@@ -13,22 +13,22 @@
 #include "tests/support/update_bench.hpp"
 #include "tests/support/write_once_model.hpp"
 
-namespace flexspline {
+namespace flexspline::update_weak_bits_test {
 namespace {
 
 using boot::Slot;
 using boot::Start;
-using testing::CutAt;
-using testing::PowerCut;
+using tests::CutAt;
+using tests::PowerCut;
 
 // Bits that are programmed one by one, and double words that are written once.
 struct Bits {
-  using Cells = testing::SlotCells;
-  using Flash = testing::SlotFlash;
+  using Cells = tests::SlotCells;
+  using Flash = tests::SlotFlash;
 };
 struct DoubleWords {
-  using Cells = testing::OnceCells<testing::kSlotBytes, boot::kImageSectors>;
-  using Flash = testing::OnceFlash<testing::kSlotBytes, boot::kImageSectors>;
+  using Cells = tests::OnceCells<tests::kSlotBytes, boot::kImageSectors>;
+  using Flash = tests::OnceFlash<tests::kSlotBytes, boot::kImageSectors>;
 };
 
 // One drive, with such a memory: which images may be started, as far as is known from what was done.
@@ -40,8 +40,8 @@ class UpdateHistory {
  public:
   explicit UpdateHistory(std::uint64_t seed) : random_(seed) {
     SlotFlash flash(cells_);
-    TestSlots slots(flash, testing::kTestBoard);
-    testing::download(slots, image_of(confirmed_));
+    TestSlots slots(flash, tests::kTestBoard);
+    tests::download(slots, image_of(confirmed_));
     slots.resume();
     slots.confirm();
     slots.resume();
@@ -58,7 +58,7 @@ class UpdateHistory {
       flash.cut(random_() % longest[random_() % 3], static_cast<CutAt>(random_() % 3));
     }
     try {
-      TestSlots slots(flash, testing::kTestBoard);
+      TestSlots slots(flash, tests::kTestBoard);
       ++starts_;
       const Start start = slots.resume();
       if (const std::string wrong = started(slots, start); !wrong.empty()) return wrong;
@@ -79,7 +79,7 @@ class UpdateHistory {
   static std::uint16_t counter_of(std::uint8_t name) { return name / 8; }
   static bool hangs(std::uint8_t name) { return name % 4 == 3; }
   static std::vector<std::uint8_t> image_of(std::uint8_t name) {
-    return testing::image_named(name, 42, testing::kTestBoard, counter_of(name));
+    return tests::image_named(name, 42, tests::kTestBoard, counter_of(name));
   }
   static std::uint8_t name_of(const TestSlots& slots) {
     const auto image = slots.image(Slot::application);
@@ -111,7 +111,7 @@ class UpdateHistory {
   }
   // Another object, as it is another program.
   void confirm(SlotFlash& flash) {
-    TestSlots application(flash, testing::kTestBoard);
+    TestSlots application(flash, tests::kTestBoard);
     if (!application.on_trial()) return;
     is_certain_ = false;
     if (!application.confirm()) return;
@@ -121,7 +121,7 @@ class UpdateHistory {
   }
   // By the boot loader, which a host requested.
   std::string load(SlotFlash& flash) {
-    TestSlots slots(flash, testing::kTestBoard);
+    TestSlots slots(flash, tests::kTestBoard);
     slots.keep_counter();
     // Every eighth time an old one. Names are used again after 250 updates, with the counter back at zero: the drive
     // refuses those, and the history ends there.
@@ -156,7 +156,7 @@ class UpdateHistory {
 
 template <class Memory>
 void cut_updates(const char* memory) {
-  const std::size_t wanted = testing::in_campaign<std::size_t>(100'000, 1'000'000);
+  const std::size_t wanted = tests::in_campaign<std::size_t>(100'000, 1'000'000);
   std::size_t cuts = 0, updates = 0, taken_back = 0;
   std::uint64_t seed = 0;
   for (; cuts < wanted;) {
@@ -183,4 +183,4 @@ TEST(UpdateWithWeakBits, LosesNothingButTheOperationThatWasCutInAMemoryOfDoubleW
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::update_weak_bits_test

@@ -13,11 +13,11 @@
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "tests/support/plain_model.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::user_defined_effects_test {
 namespace {
 
 using data::Column;
-using testing::plain_model;
+using tests::plain_model;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kNoise = 2e-4;
@@ -218,4 +218,4 @@ TEST(DiagnoseUnknown, LeavesAnEffectOfTheCatalogueItsName) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::user_defined_effects_test

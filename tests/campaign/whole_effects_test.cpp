@@ -6,11 +6,11 @@
 #include "tests/support/campaign_size.hpp"
 #include "tests/support/hidden_twin.hpp"
 
-namespace flexspline {
+namespace flexspline::whole_effects_test {
 namespace {
 
 std::string named(const std::string& hidden, double scale, std::uint64_t seed, double variation = 0.0) {
-  return testing::names(testing::HiddenTwin(hidden, scale, seed, variation).diagnose());
+  return tests::names(tests::HiddenTwin(hidden, scale, seed, variation).diagnose());
 }
 
 class WholeEffects : public ::testing::TestWithParam<std::string> {};
@@ -21,8 +21,8 @@ TEST_P(WholeEffects, AreNamedThoughTheBaseModelIsWorthLittleWithoutThem) {
 
 // A limit of the current has no size of its own: it fits at its place only.
 INSTANTIATE_TEST_SUITE_P(Hidden, WholeEffects,
-                         ::testing::ValuesIn(testing::part_of({"linear_stiffness", "output_coulomb_friction",
-                                                               "current_saturation", "bouc_wen_hysteresis"})));
+                         ::testing::ValuesIn(tests::part_of({"linear_stiffness", "output_coulomb_friction",
+                                                             "current_saturation", "bouc_wen_hysteresis"})));
 
 TEST(SmallOffset, OfTheTorqueSensorIsNamedByTheLoadThatMovesFreely) {
   // A hundredth of a spring's noise, and two thirds of the load balance's.
@@ -30,7 +30,7 @@ TEST(SmallOffset, OfTheTorqueSensorIsNamedByTheLoadThatMovesFreely) {
 }
 
 TEST(TorqueScale, OfMotorAndSensorIsNotToldWithoutATorqueThatIsKnown) {
-  for (const std::string& hidden : testing::part_of({"torque_constant_error", "torque_sensor_gain"})) {
+  for (const std::string& hidden : tests::part_of({"torque_constant_error", "torque_sensor_gain"})) {
     const std::string names = named(hidden, 1.0, 8403);
     EXPECT_NE(names.find("torque_constant_error"), std::string::npos) << names;
     EXPECT_NE(names.find("torque_sensor_gain"), std::string::npos) << names;
@@ -38,4 +38,4 @@ TEST(TorqueScale, OfMotorAndSensorIsNotToldWithoutATorqueThatIsKnown) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::whole_effects_test

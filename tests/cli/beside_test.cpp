@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::beside_test {
 namespace {
 
 class Beside : public testing::Test {
@@ -79,4 +79,4 @@ TEST_F(Beside, AWrongSpecificationIsQuotedBeforeAnythingIsRead) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::beside_test

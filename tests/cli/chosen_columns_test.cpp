@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::chosen_columns_test {
 namespace {
 
 constexpr double kInertia = 2e-4, kRatio = 100.0;
@@ -71,4 +71,4 @@ TEST(ChosenColumns, AMappedPositionOfTheLinkIsTakenToTheMotorToo) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::chosen_columns_test

@@ -6,7 +6,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/support/mat5.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::commands_test {
 namespace {
 
 fs::path emps_folder() {
@@ -83,7 +83,7 @@ TEST(New, ReadsAMatFileAsItReadsTheSameCsv) {
     text += line;
   }
   shell.write("csv/log.csv", text);
-  shell.write("mat/log.mat", flexspline::testing::Mat5Text()
+  shell.write("mat/log.mat", flexspline::tests::Mat5Text()
                                  .add("recorder", time)
                                  .add("Iq_in_mA", current)
                                  .add("motorpos", angle)
@@ -182,4 +182,4 @@ TEST(Output, HasNoEscapeCodesAwayFromATerminal) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::commands_test

@@ -10,7 +10,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::commission_test {
 namespace {
 
 using nlohmann::json;
@@ -144,4 +144,4 @@ TEST(Commission, ADriveWithoutAStageWrongNumbersAndALockedDriveAreExplained) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::commission_test

@@ -6,7 +6,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::derivatives_test {
 namespace {
 
 constexpr double kStep = 2.0 * M_PI / 4000.0, kRate = 4.0 * M_PI, kAmplitude = 5.0;
@@ -107,4 +107,4 @@ TEST(Derivatives, KalmanAsAnOptionOfThePipelineFindsTheSameParameters) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::derivatives_test

@@ -6,7 +6,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::documents_test {
 namespace {
 
 // A fenced block of a document behind a line "<!-- MARK -->" or "<!-- MARK ARGUMENT -->".
@@ -151,4 +151,4 @@ int main() {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::documents_test

@@ -7,7 +7,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::drive_commands_test {
 namespace {
 
 using nlohmann::json;
@@ -356,4 +356,4 @@ TEST(Record, FramesThatASlowHostMissesAreCountedAndNamedInTheFile) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::drive_commands_test

@@ -4,7 +4,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::drive_hardware_test {
 namespace {
 
 using nlohmann::json;
@@ -101,4 +101,4 @@ TEST(DriveHardware, AFactoryResetLeavesNoBlock) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::drive_hardware_test

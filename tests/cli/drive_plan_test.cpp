@@ -11,7 +11,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::drive_plan_test {
 namespace {
 
 using nlohmann::json;
@@ -140,4 +140,4 @@ TEST(MonitorResidualMap, NamesWhatTheDrivesModelLacksAndIsEmptyAfterAReset) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::drive_plan_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::drive_test {
 namespace {
 
 TEST(HilDrive, RunsEachScenarioWithAndWithoutCompensation) {
@@ -67,4 +67,4 @@ TEST(HilDrive, HelpHasAnExampleThatWorks) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::drive_test

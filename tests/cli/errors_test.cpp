@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::errors_test {
 namespace {
 
 constexpr const char* kModel = "format = \"flexspline-model/1\"\n[[effect]]\ntype = \"inertia\"\n";
@@ -106,4 +106,4 @@ TEST(BadInput, AFolderThatIsInTheWayIsNotWrittenOver) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::errors_test

@@ -4,7 +4,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::export_test {
 namespace {
 
 // Friction that a straight line describes, so that a joint has all of it: N = 100.
@@ -137,4 +137,4 @@ TEST(ExportCommand, SaysWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::export_test

@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::few_samples_test {
 namespace {
 
 constexpr const char* kModel =
@@ -83,4 +83,4 @@ TEST(LargeModels, CommandsThatSearchRefuseAModelOf300Ripples) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::few_samples_test

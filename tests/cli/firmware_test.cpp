@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::firmware_test {
 namespace {
 
 TEST(Firmware, AnImageIsMadeOfAProgram) {
@@ -76,4 +76,4 @@ TEST(Firmware, AFileThatIsNoWholeImageIsRefusedBeforeADriveIsLookedFor) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::firmware_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::fleet_test {
 namespace {
 
 constexpr const char* kPlan = R"(format = "flexspline-plan/1"
@@ -117,4 +117,4 @@ TEST(Fleet, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::fleet_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::full_disk_test {
 namespace {
 
 TEST(FullDisk, EveryCommandThatAnswersOnStandardOutputExitsNonZeroAndSaysWhy) {
@@ -44,4 +44,4 @@ TEST(FullDisk, EveryCommandThatAnswersOnStandardOutputExitsNonZeroAndSaysWhy) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::full_disk_test

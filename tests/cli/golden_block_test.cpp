@@ -7,7 +7,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::golden_block_test {
 namespace {
 
 using nlohmann::json;
@@ -44,4 +44,4 @@ TEST(GoldenBlock, OfVersion1SaysWhatItSaidWhenItWasWritten) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::golden_block_test

@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::help_test {
 namespace {
 
 constexpr const char* kBuilt[] = {
@@ -72,4 +72,4 @@ TEST(Help, AWrongCommandNamesTheNearestOne) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::help_test

@@ -11,7 +11,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::interfaces_test {
 namespace {
 
 // Whether a program of the machine is there; `./dev test` installs those that are used here.
@@ -179,4 +179,4 @@ TEST(Install, TheDebianPackageListsProgramsAndDependencies) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::interfaces_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::json_test {
 namespace {
 
 void expect_parameter(const nlohmann::json& p) {
@@ -134,4 +134,4 @@ TEST(Json, AFileGetsTheSameAsStandardOutput) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::json_test

@@ -8,7 +8,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::measure_test {
 namespace {
 
 // Odd multisine, 0.5 to 40.5 Hz, through an inertia on a spring (12.4 Hz, damping ratio 0.06) and a torque sensor whose
@@ -164,4 +164,4 @@ TEST(Measure, RefusesBadInputAsTheOthersDo) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::measure_test

@@ -6,7 +6,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::measured_velocity_test {
 namespace {
 
 constexpr double kInertia = 2e-4, kCoulomb = 0.05;
@@ -56,4 +56,4 @@ TEST(MeasuredVelocity, KeepsTheInertiaWhereThePositionHasMuchNoiseAndTheFiltersS
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::measured_velocity_test

@@ -15,7 +15,7 @@
 #include "tests/cli/twin_process.hpp"
 #include "tests/support/campaign_size.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::motor_ripples_test {
 namespace {
 
 using nlohmann::json;
@@ -103,10 +103,10 @@ Tally tally(const Hidden& hidden, int first, int motors) {
 
 // In ./dev test one motor with one of them; in the whole campaign six motors with each of all.
 TEST(MotorRipples, OfMotorsThatAreDrawnAreNamedWithTheirOrderCauseAndCure) {
-  const int motors = testing::in_campaign(1, 6);
+  const int motors = tests::in_campaign(1, 6);
   Tally all;
   for (const Hidden& hidden : kHidden) {
-    if (&hidden - kHidden >= 1 && !testing::whole_campaigns()) continue;
+    if (&hidden - kHidden >= 1 && !tests::whole_campaigns()) continue;
     const Tally t = tally(hidden, 501, motors);
     EXPECT_GE(t.right, 1) << hidden.name;
     all.right += t.right;
@@ -117,9 +117,9 @@ TEST(MotorRipples, OfMotorsThatAreDrawnAreNamedWithTheirOrderCauseAndCure) {
 
 TEST(MotorRipples, NothingIsNamedInMotorsWithNothingAndNoRippleWhereTheMeasuredCurrentHasIt) {
   // Dead time: the current has the ripple and makes its torque, so nothing of that torque is missing.
-  for (int seed = 501; seed < 501 + testing::in_campaign(1, 6); ++seed)
+  for (int seed = 501; seed < 501 + tests::in_campaign(1, 6); ++seed)
     for (const char* hidden : {"", "dead-time"}) {
-      if (*hidden != '\0' && !testing::whole_campaigns()) continue;
+      if (*hidden != '\0' && !tests::whole_campaigns()) continue;
       const Answered a = diagnosed(hidden, seed);
       std::printf("nothing but '%s' hidden, motor %d: %s\n", hidden, seed, a.found["named"].dump().c_str());
       for (const json& named : a.found["named"]) EXPECT_FALSE(is_ripple(named)) << hidden << named;
@@ -130,4 +130,4 @@ TEST(MotorRipples, NothingIsNamedInMotorsWithNothingAndNoRippleWhereTheMeasuredC
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::motor_ripples_test

@@ -9,7 +9,7 @@
 #include "tests/cli/twin_process.hpp"
 #include "tests/support/campaign_size.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::nothing_hidden_test {
 namespace {
 
 using nlohmann::json;
@@ -21,7 +21,7 @@ json named(const Shell& shell) {
 }
 
 TEST(NothingHidden, NothingIsNamedWithAndWithoutTheTorqueSensor) {
-  for (int seed = 601; seed < 601 + testing::in_campaign(1, 12); ++seed) {
+  for (int seed = 601; seed < 601 + tests::in_campaign(1, 12); ++seed) {
     const Shell shell;
     const TwinProcess twin({"--serve", "0", "--fast", "--seed", std::to_string(seed)});
     shell.write("plan.toml", free_motions());
@@ -33,4 +33,4 @@ TEST(NothingHidden, NothingIsNamedWithAndWithoutTheTorqueSensor) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::nothing_hidden_test

@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::order_causes_test {
 namespace {
 
 using nlohmann::json;
@@ -106,4 +106,4 @@ TEST(OrderCausesOfARecording, AnOrderBeyondTwentyFourIsFoundWhereThePolePairsGiv
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::order_causes_test

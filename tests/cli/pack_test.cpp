@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::pack_test {
 namespace {
 
 constexpr const char* kModel = R"(format = "flexspline-model/1"
@@ -106,4 +106,4 @@ TEST(UnpackCommand, SaysWhatIsWrongWithABlock) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::pack_test

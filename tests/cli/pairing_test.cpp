@@ -8,7 +8,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::pairing_test {
 namespace {
 
 using nlohmann::json;
@@ -116,4 +116,4 @@ TEST(Pair, SaysWhatIsWrongWithAKeyAndWhatToDo) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::pairing_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::plan_test {
 namespace {
 
 constexpr const char* kFit = "flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml";
@@ -43,4 +43,4 @@ TEST(PlanCommand, SaysWhatItNeeds) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::plan_test

@@ -7,7 +7,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::position_side_test {
 namespace {
 
 constexpr double kJ = 2e-4, kB = 1e-3, kC = 0.05, kKm = 0.1, kRatio = 100.0;
@@ -159,4 +159,4 @@ TEST(PositionSide, OneJointOfSeveralIsChosenByItsNumber) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::position_side_test

@@ -14,7 +14,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::protocol_header_test {
 namespace {
 
 TEST(ProtocolHeader, ACompilerForCPlacesEachFieldWhereTheHeaderSays) {
@@ -105,4 +105,4 @@ TEST(ProtocolHeader, APythonProgramReadsTelemetryOfADriveByIt) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::protocol_header_test

@@ -8,7 +8,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::public_formats_test {
 namespace {
 
 // The drive of fixtures/make.py.
@@ -203,4 +203,4 @@ TEST(PublicFormats, DspaceControlDesk) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::public_formats_test

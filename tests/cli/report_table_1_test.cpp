@@ -7,7 +7,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::report_table_1_test {
 namespace {
 
 constexpr double kAmplitude = 0.01, kVelocity = 0.05;
@@ -86,4 +86,4 @@ TEST_F(ReportTable1, OutputErrorFindsTheAmplitudeAndSaysThatTheVelocityHasSevera
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::report_table_1_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::report_test {
 namespace {
 
 nlohmann::json document_in(const std::string& page) {
@@ -136,4 +136,4 @@ TEST(EffectsCommand, DrawsACurveAndGivesItsPoints) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::report_test

@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::sensitivity_test {
 namespace {
 
 // A short free and a short locked motion are enough.
@@ -129,4 +129,4 @@ TEST_F(SensitivityCommand, AScalingThatCannotBeMeantIsQuoted) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::sensitivity_test

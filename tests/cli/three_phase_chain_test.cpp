@@ -9,7 +9,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::three_phase_chain_test {
 namespace {
 
 using nlohmann::json;
@@ -97,4 +97,4 @@ TEST(ThreePhaseChain, GivesTheNumbersOfTheDriveWithAServoAmplifier) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::three_phase_chain_test

@@ -5,7 +5,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::time_unit_test {
 namespace {
 
 std::string log_with_time_in(double unit) {
@@ -38,4 +38,4 @@ TEST(TimeUnit, CommandsThatSimulateEndAndNameIt) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::time_unit_test

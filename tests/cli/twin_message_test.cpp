@@ -3,7 +3,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::twin_message_test {
 namespace {
 
 TEST(TwinMessage, TheReasonOfAChildThatFailsIsInTheMessageItself) {
@@ -19,4 +19,4 @@ TEST(TwinMessage, TheReasonOfAChildThatFailsIsInTheMessageItself) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::twin_message_test

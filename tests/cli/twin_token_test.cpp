@@ -8,7 +8,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::twin_token_test {
 namespace {
 
 // What comes back to these bytes until the other end closes the line, or half a second.
@@ -58,4 +58,4 @@ TEST(TwinToken, APostFromAWebPageAndAWrongTokenAreClosedAndDisturbNoHost) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::twin_token_test

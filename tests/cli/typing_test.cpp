@@ -6,7 +6,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::typing_test {
 namespace {
 
 std::size_t longest_line(const std::string& text) {
@@ -78,4 +78,4 @@ TEST(Typing, TheCatalogueAndTheHelpKeepToTheWidthOfTheTerminal) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::typing_test

@@ -6,7 +6,7 @@
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::unfinished_project_test {
 namespace {
 
 std::string log_of(const std::string& header, int count = 2000) {
@@ -66,4 +66,4 @@ TEST(UnfinishedProject, WhatCanBeToleratedStandsInTheLine) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::unfinished_project_test

@@ -7,7 +7,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test {
+namespace flexspline::cli_test::whole_circle_test {
 namespace {
 
 using nlohmann::json;
@@ -111,4 +111,4 @@ TEST(WholeCircle, FromRecordingsOfADriveWithAHiddenEffectToACloserMotion) {
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test
+}  // namespace flexspline::cli_test::whole_circle_test

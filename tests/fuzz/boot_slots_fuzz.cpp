@@ -34,7 +34,7 @@ void read_anything(std::span<const std::uint8_t> bytes) {
                 read.crc == header.crc && read.board == header.board && read.version == header.version,
             "a header does not survive being written");
   }
-  boot::check_header(bytes, testing::kTestBoard, bytes.size(), header);
+  boot::check_header(bytes, tests::kTestBoard, bytes.size(), header);
 }
 
 }  // namespace
@@ -43,7 +43,7 @@ void read_anything(std::span<const std::uint8_t> bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   tests::FuzzBytes bytes(data, size);
   read_anything({data, size});
-  testing::SlotCells cells;
+  tests::SlotCells cells;
   while (!bytes.empty()) {
     const std::uint8_t what = bytes.next();
     auto& sector = cells.sectors[(what >> 2) % boot::kImageSectors];
@@ -52,12 +52,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const auto piece = bytes.some(std::min<std::size_t>(bytes.next(), sector.size() - at));
       std::copy(piece.begin(), piece.end(), sector.begin() + static_cast<std::ptrdiff_t>(at));
     } else if ((what & 3) == 1) {
-      const auto image = testing::image_named(bytes.next(), 1 + bytes.next() % 150,
-                                              (what & 16) != 0 ? "another" : testing::kTestBoard);
+      const auto image =
+          tests::image_named(bytes.next(), 1 + bytes.next() % 150, (what & 16) != 0 ? "another" : tests::kTestBoard);
       std::copy(image.begin(), image.end(), sector.begin());
     } else if ((what & 3) == 2) {
       constexpr std::uint32_t kSet = 0x5AA53CC3;
-      const std::size_t at = testing::TestSlots::kImageBytes + 4 * (bytes.next() % 16);
+      const std::size_t at = tests::TestSlots::kImageBytes + 4 * (bytes.next() % 16);
       for (std::size_t i = 0; i < 4; ++i)
         cells.sectors[1][at + i] = static_cast<std::uint8_t>(kSet >> (8 * i) | ((what & 32) != 0 ? what : 0));
     } else {
@@ -66,28 +66,28 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       boot::ImageHeader header;
       header.bytes = 1U + what % 150U;
       header.crc = model::crc32(all.subspan(boot::kHeaderBytes, header.bytes));
-      header.board = boot::board_bytes(testing::kTestBoard);
+      header.board = boot::board_bytes(tests::kTestBoard);
       header.version = {what, bytes.next()};
       boot::write_header(all.first<boot::kHeaderBytes>(), header);
     }
   }
   for (int start = 0; start < 6; ++start) {
-    testing::SlotFlash flash(cells);
-    testing::TestSlots slots(flash, testing::kTestBoard);
+    tests::SlotFlash flash(cells);
+    tests::TestSlots slots(flash, tests::kTestBoard);
     const Start found = slots.resume();
     require((found == Start::none) || !slots.image(Slot::application).empty(), "what is started is not whole");
     if (found == Start::none) require(slots.resume() == Start::none, "the next look finds something else");
     if (found == Start::trial) require(slots.on_trial(), "a trial that nobody knows of");
     if (start == 3 && (size & 1) != 0 && found == Start::trial) slots.confirm();
   }
-  testing::SlotFlash flash(cells);
-  testing::TestSlots slots(flash, testing::kTestBoard);
+  tests::SlotFlash flash(cells);
+  tests::TestSlots slots(flash, tests::kTestBoard);
   // Whatever the counter is, this one is not smaller.
-  const auto newest = testing::image_named('n', 42, testing::kTestBoard, 0xFFFF);
-  require(testing::download(slots, newest), "nothing can be downloaded");
-  testing::TestSlots next(flash, testing::kTestBoard);
+  const auto newest = tests::image_named('n', 42, tests::kTestBoard, 0xFFFF);
+  require(tests::download(slots, newest), "nothing can be downloaded");
+  tests::TestSlots next(flash, tests::kTestBoard);
   require(next.resume() == Start::trial && next.confirm(), "what was downloaded is not started");
-  testing::TestSlots last(flash, testing::kTestBoard);
+  tests::TestSlots last(flash, tests::kTestBoard);
   require(last.resume() == Start::application && std::ranges::equal(last.image(Slot::application), newest),
           "what was confirmed is not what is started");
   return 0;

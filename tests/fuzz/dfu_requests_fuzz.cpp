@@ -25,39 +25,39 @@ void require(bool holds, const char* what) {
 }
 
 struct Board {
-  using Slots = testing::SlotFlash;
+  using Slots = tests::SlotFlash;
   using Trust = boot::AnySigner;
   static constexpr bool kCanUpload = true;
-  static constexpr std::string_view kName = testing::kTestBoard;
+  static constexpr std::string_view kName = tests::kTestBoard;
   static constexpr std::uint32_t kEraseMs = 1, kBlockMs = 1, kCheckMs = 1;
   Slots& slots() { return flash; }
   bool takes_loader_request() { return false; }
-  testing::SlotFlash& flash;
+  tests::SlotFlash& flash;
 };
 // From one start to the next.
 struct Powered {
   using Loader = firmware::BootLoader<Board>;
-  explicit Powered(testing::SlotCells& cells) : flash(cells) {
+  explicit Powered(tests::SlotCells& cells) : flash(cells) {
     start = loader.start();
     bus.device.get<Loader::Dfu>().use(memory);
     require(bus.host.enumerate(), "not to be enumerated");
   }
-  testing::SlotFlash flash;
+  tests::SlotFlash flash;
   Board board{flash};
   Loader loader{board};
-  testing::TestSlots slots{flash, testing::kTestBoard};
+  tests::TestSlots slots{flash, tests::kTestBoard};
   firmware::UpdateMemory<Board> memory{slots};
   Bench<false, Loader::Dfu> bus;
   boot::Start start{};
 };
 
 // An application that is confirmed, and one before it.
-testing::SlotCells installed() {
-  testing::SlotCells cells;
+tests::SlotCells installed() {
+  tests::SlotCells cells;
   for (const std::uint8_t name : {'a', 'b'}) {
-    testing::SlotFlash flash(cells);
-    testing::TestSlots slots(flash, testing::kTestBoard);
-    require(testing::download(slots, testing::image_named(name)), "no image can be installed");
+    tests::SlotFlash flash(cells);
+    tests::TestSlots slots(flash, tests::kTestBoard);
+    require(tests::download(slots, tests::image_named(name)), "no image can be installed");
     slots.resume();
     slots.confirm();
   }
@@ -68,11 +68,11 @@ testing::SlotCells installed() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   FuzzBytes bytes(data, size);
-  static const testing::SlotCells kInstalled = installed();
-  testing::SlotCells cells = kInstalled;
+  static const tests::SlotCells kInstalled = installed();
+  tests::SlotCells cells = kInstalled;
   auto now = std::make_unique<Powered>(cells);
   // A good image, of which an input may send any part; it may change a byte of it.
-  Octets image = testing::image_named('c');
+  Octets image = tests::image_named('c');
   std::uint16_t number = 0;
   std::size_t at = 0;
   while (!bytes.empty()) {
@@ -135,7 +135,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   boot::ImageHeader header;
   require(boot::read_image(after.slots.image(boot::Slot::application), header) == boot::ImageFinding::none,
           "what is started is not whole");
-  require(testing::download(after.slots, testing::image_named('d')), "the next update is refused");
+  require(tests::download(after.slots, tests::image_named('d')), "the next update is refused");
   Powered updated(cells);
   require(updated.start == boot::Start::trial, "the next update is not started");
   return 0;

@@ -59,22 +59,22 @@ struct Board {
 
 constexpr std::size_t kSector = 4096;
 using Application = firmware::Application<Board>;
-using Flash = testing::FlashModel<kSector>;
+using Flash = tests::FlashModel<kSector>;
 using Store = storage::ParameterStore<Flash>;
 using Blocks = firmware::ApplicationBlocks<Application, Board::kTickHz>;
 constexpr std::size_t kPairingSector = 16'384;
-using PairingFlash = testing::FlashModel<kPairingSector, 1>;
+using PairingFlash = tests::FlashModel<kPairingSector, 1>;
 using Pairing = storage::PairingMemory<PairingFlash>;
 using Lock = firmware::ParameterLock<Pairing, Board>;
 
 struct Drive {
-  testing::FlashCells<kSector> cells;
+  tests::FlashCells<kSector> cells;
   Board board;
   Application application{board};
   Flash flash{cells};
   Store store{flash};
   Blocks blocks{application};
-  testing::FlashCells<kPairingSector, 1> pairing_cells;
+  tests::FlashCells<kPairingSector, 1> pairing_cells;
   PairingFlash pairing_flash{pairing_cells};
   Pairing pairing{pairing_flash};
   Lock lock{pairing, board};

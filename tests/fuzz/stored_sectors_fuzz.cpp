@@ -14,8 +14,8 @@ namespace {
 
 using namespace flexspline;
 constexpr std::size_t kSector = 512;
-using Cells = testing::FlashCells<kSector>;
-using Flash = testing::FlashModel<kSector>;
+using Cells = tests::FlashCells<kSector>;
+using Flash = tests::FlashModel<kSector>;
 using Store = storage::ParameterStore<Flash>;
 
 void require(bool holds, const char* what) {

@@ -9,7 +9,7 @@
 #include "hil/rhs100/data_set.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::data_set_test {
 namespace {
 
 std::string text_of(const std::filesystem::path& file) {
@@ -81,4 +81,4 @@ TEST_F(Rhs100DataSet, APartThatThereIsNotIsRefusedWithTheNamesOfThoseThatAre) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::data_set_test

@@ -14,7 +14,7 @@
 #include "hil/thesis_models/runge_kutta.hpp"
 #include "host/common/signals/differentiators.hpp"
 
-namespace flexspline {
+namespace flexspline::differentiation_test {
 namespace {
 
 using signals::Derivatives;
@@ -287,4 +287,4 @@ TEST(Section134, OnlyTheZeroPhaseFilterMayStandBesideASignalThatIsNotFiltered) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::differentiation_test

@@ -14,7 +14,7 @@
 #include "hil/thesis_models/runge_kutta.hpp"
 #include "host/engine/blackbox/specification.hpp"
 
-namespace flexspline {
+namespace flexspline::fir_arx_test {
 namespace {
 
 using blackbox::Errors;
@@ -220,4 +220,4 @@ TEST(Section131, ALinearBlackBoxDoesNotLearnDryFriction) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::fir_arx_test

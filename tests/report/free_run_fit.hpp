@@ -14,7 +14,7 @@
 #include "host/physics/simulation/simulation.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 struct FreeParameter {
   std::vector<std::pair<std::string, std::string>> places;  // effect and parameter; several have one value
@@ -179,4 +179,4 @@ inline FreeRunFit fit_free_run(const data::Experiment& experiment, const model::
   return fit;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -13,23 +13,22 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
-#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "host/common/numbers/real.hpp"
 #include "shared/fixed/system.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::kalman_filter_test {
 namespace {
 
 using fixed::Fixed;
 using numbers::Real;
 using observers::EncoderKalman;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kCounts = 4096.0;
 constexpr double kSettledS = 4.0;
 constexpr double kEndS = 12.0;
@@ -267,4 +266,4 @@ TEST(Section43, BelowACountPerMemoryAThirdIsOutOfReachAndTheRatioIsThatOfThePuls
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::kalman_filter_test

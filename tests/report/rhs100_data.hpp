@@ -18,7 +18,7 @@
 #include "host/physics/catalogue/catalogue.hpp"
 #include "host/physics/model/model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline constexpr std::uint64_t kJudgingSeed = 7001;
 
@@ -153,4 +153,4 @@ inline Power power_of(const Column& x, const Column& y) {
   return {slope, slope / (deviation / std::sqrt(xx)), 100.0 * deviation};
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -9,23 +9,22 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <numbers>
 #include <vector>
 
 #include "hil/plant/parameters.hpp"
 #include "hil/plant/recorder.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/observers/riccati.hpp"
 #include "shared/observers/ripple_filter.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::ripple_filter_test {
 namespace {
 
 using fixed::Checked;
 using observers::RippleFilter;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kMemoryTurns = 20.0;
 
 struct Recorded {
@@ -164,4 +163,4 @@ TEST(Section53, SlowMotionTakesLongerToTheSameEndWithFixedGains) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::ripple_filter_test

@@ -8,7 +8,7 @@
 #include "host/engine/sensitivity/sensitivity.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline {
+namespace flexspline::sensitivity_test {
 namespace {
 
 using sensitivity::Sensitivity;
@@ -43,8 +43,8 @@ struct Study {
         plan("slow", Mode::velocity, Waveform::triangle, 12.0, 0.2, false),
         plan("locked 1 Hz", Mode::current, Waveform::sine, 2.8, 1.0, true)};
     constexpr std::uint64_t kSeed = 7054;
-    const data::Dataset dataset = testing::dataset_of(drive, plant::record_all(drive, plans, kSeed));
-    answer = sensitivity::analyse(dataset, testing::model_of(drive, false, true), {});
+    const data::Dataset dataset = tests::dataset_of(drive, plant::record_all(drive, plans, kSeed));
+    answer = sensitivity::analyse(dataset, tests::model_of(drive, false, true), {});
   }
 
   const sensitivity::Variant& variant(std::string_view label) const {
@@ -122,4 +122,4 @@ TEST(Section54, WithoutStructuralDampingThePhaseOfTheLockedVelocityIsWrong) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::sensitivity_test

@@ -11,7 +11,7 @@
 #include "tests/report/rhs100_data.hpp"
 #include "tests/support/campaign_size.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::table_1_test {
 namespace {
 
 namespace published = report::published;
@@ -181,4 +181,4 @@ TEST(Table1Simulation, TheReportsBoundaryLayerHidTheStribeckVelocityFromItsOwnSi
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::table_1_test

@@ -9,7 +9,7 @@
 #include "host/physics/simulation/simulation.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::table_2_3_test {
 namespace {
 
 namespace published = report::published;
@@ -165,4 +165,4 @@ TEST_F(Figures24To27, BreakAwayDependsOnTheDirectionAndTheModelBreaksAwayWithThe
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::table_2_3_test

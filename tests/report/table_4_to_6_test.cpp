@@ -7,7 +7,7 @@
 #include "host/engine/comparison/compare.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::table_4_to_6_test {
 namespace {
 
 namespace published = report::published;
@@ -190,4 +190,4 @@ TEST_F(Table6, TheCubicModelOverpredictsAtLargeTorsionAndTheLinearOneDoesNot) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::table_4_to_6_test

@@ -5,7 +5,7 @@
 #include "host/engine/selection/trends.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::table_7_test {
 namespace {
 
 namespace published = report::published;
@@ -188,4 +188,4 @@ TEST_F(Table7, ADriveWithSublinearFrictionShowsTheTrendOfTheReportsRows) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::table_7_test

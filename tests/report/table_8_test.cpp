@@ -7,7 +7,7 @@
 #include "host/engine/selection/diagnosis.hpp"
 #include "tests/report/rhs100_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::table_8_test {
 namespace {
 
 namespace published = report::published;
@@ -115,4 +115,4 @@ TEST_F(Table8, FrictionThatRisesAtLowSpeedIsAcceptedAndNamedSo) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::table_8_test

@@ -72,9 +72,9 @@ struct Bench {
     file.drive.sensors.current.correlation = c.noise_correlation;
     file.drive.sensors.torque.correlation = c.noise_correlation;
     records = plant::record_all(file.drive, file.experiments, c.seed);
-    dataset = testing::dataset_of(file.drive, records);
-    base = testing::model_of(file.drive, false, false);
-    truth = testing::model_of(file.drive, true, true);
+    dataset = tests::dataset_of(file.drive, records);
+    base = tests::model_of(file.drive, false, false);
+    truth = tests::model_of(file.drive, true, true);
   }
 
   std::vector<const data::Experiment*> of(data::Role role) const {
@@ -98,7 +98,7 @@ struct Bench {
     const estimation::PreparedData prepared = estimation::prepare(of(data::Role::fit), truth, {});
     RegressionProblem data(prepared, balance);
     const estimation::Terms full = estimation::terms_of(truth),
-                            without = estimation::terms_of(testing::model_of(file.drive, false, true));
+                            without = estimation::terms_of(tests::model_of(file.drive, false, true));
     Eigen::VectorXd noise = data.residual(full);
     Eigen::VectorXd missing = data.residual(without) - noise;
     for (std::size_t t = 0; t < full.size(); ++t) {

@@ -19,9 +19,9 @@ namespace {
 constexpr double kFalseAlarmTarget = 1.0 / 300.0;
 constexpr double kCalibratedFor = 1.0 / 1000.0;
 
-using testing::exact_interval;
-using testing::Interval;
-using testing::threshold_from;
+using tests::exact_interval;
+using tests::Interval;
+using tests::threshold_from;
 using Selection = std::vector<const Outcome*>;
 
 Selection select(const std::vector<Outcome>& all, const std::function<bool(const Outcome&)>& which) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline bool whole_campaigns() {
   return std::getenv("FLEXSPLINE_WHOLE_CAMPAIGNS") != nullptr;
@@ -27,4 +27,4 @@ inline std::vector<std::string> part_of(const std::vector<std::string>& all, std
   return part;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

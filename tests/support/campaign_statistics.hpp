@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // Exact two-sided 95 % interval of a share (Clopper and Pearson 1934) of which `count` of `total` were seen.
 struct Interval {
@@ -39,4 +39,4 @@ inline double threshold_from(std::vector<double> scores, double share) {
   return start + scale * std::log(beyond / share);
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

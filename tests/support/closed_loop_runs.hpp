@@ -13,7 +13,7 @@
 #include "tests/support/on_all_cores.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline constexpr double kLoopTickHz = board::SoftwareBoard::kTickHz;
 
@@ -92,4 +92,4 @@ inline closed_loop::Runner loop_runner() {
   };
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

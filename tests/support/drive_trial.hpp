@@ -14,6 +14,7 @@
 #include "host/physics/catalogue/catalogue.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/model/drive_model.hpp"
 #include "shared/model/proof.hpp"
 
@@ -28,7 +29,6 @@ using fixed::OverflowLog;
 using numbers::Real;
 
 inline constexpr double kTickS = 1.0 / 16000.0;
-inline constexpr double kTurn = 2.0 * std::numbers::pi;
 
 using Random = std::mt19937;
 inline double between(Random& random, double low, double high) {

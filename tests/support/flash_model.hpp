@@ -11,7 +11,7 @@
 
 #include "shared/storage/flash_port.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 struct PowerCut {};
 
@@ -131,4 +131,4 @@ class FlashModel {
   bool fails_ = false;
 };
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

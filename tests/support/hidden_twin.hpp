@@ -10,7 +10,7 @@
 #include "host/engine/selection/diagnosis.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 struct HiddenTwin {
   plant::PlantFile file = plant::demo_plant();
@@ -38,4 +38,4 @@ inline std::string names(const selection::Diagnosis& found) {
   return list;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

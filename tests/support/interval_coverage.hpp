@@ -18,7 +18,7 @@
 #include "tests/support/campaign_statistics.hpp"
 #include "tests/support/twin_data.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // What surrounds the drive of a demo: how its sensors and its friction are.
 struct World {
@@ -157,4 +157,4 @@ inline void print(const std::string& heading, const Coverage& coverage) {
   }
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 class Mat5Text {
  public:
@@ -49,4 +49,4 @@ class Mat5Text {
   std::string text_;
 };
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -14,7 +14,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/model/model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 struct NoisyMotor {
   double inertia = 1e-4;             // kg m^2
@@ -88,4 +88,4 @@ inline model::Model motor_model(const NoisyMotor& motor) {
   return model;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

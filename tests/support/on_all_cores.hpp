@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // Calls act(0) to act(count - 1) on all cores. Throws what one of them threw first; the others are not begun then.
 template <class Act>
@@ -35,4 +35,4 @@ void on_all_cores(std::size_t count, Act act) {
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

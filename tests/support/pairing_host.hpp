@@ -46,8 +46,8 @@ struct StillBoard {
 };
 
 inline constexpr std::size_t kPairingSector = 16'384;
-using PairingCells = testing::FlashCells<kPairingSector, 1>;
-using PairingFlash = testing::FlashModel<kPairingSector, 1>;
+using PairingCells = tests::FlashCells<kPairingSector, 1>;
+using PairingFlash = tests::FlashModel<kPairingSector, 1>;
 using PairingStore = storage::PairingMemory<PairingFlash>;
 
 // A lock from one start to the next.

@@ -5,7 +5,7 @@
 #include "host/physics/catalogue/catalogue.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // Inertia, viscous and Coulomb friction of a rotary axis, without values: what most axes are first described by.
 inline model::Model plain_model() {
@@ -22,4 +22,4 @@ inline model::Model plain_model_with(std::initializer_list<const char*> more) {
   return m;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -2,7 +2,7 @@
 
 #include "host/engine/selection/candidate_fits.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // The torque ripple of an order, fitted in addition to a model that `search` has fitted.
 inline selection::CandidateFit ripple_candidate(selection::BalanceSearch& search, double order,
@@ -15,4 +15,4 @@ inline selection::CandidateFit ripple_candidate(selection::BalanceSearch& search
   return candidate;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

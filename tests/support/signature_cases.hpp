@@ -15,7 +15,7 @@
 
 #include "shared/boot/signature/ed25519.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 using Bytes32 = std::array<std::uint8_t, 32>;
 
@@ -221,4 +221,4 @@ inline Agreement agreement_with_libsodium(std::size_t count, std::uint64_t seed)
   return result;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -6,7 +6,7 @@
 
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline constexpr double kSwingingDry_nm = 0.05, kSwingingNoise_nm = 5e-4;
 
@@ -34,4 +34,4 @@ inline data::Dataset swinging_axis(double travel_rad, double encoder_step_rad = 
   return dataset;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

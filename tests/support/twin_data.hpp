@@ -11,7 +11,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/model/model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline data::Experiment experiment_of(const plant::Record& record, const plant::Drive& drive) {
   using data::Column;
@@ -79,4 +79,4 @@ inline model::Model model_of(const plant::Drive& drive, bool with_hidden, bool w
   return model;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -7,7 +7,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/model/model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline model::Model two_ampere_drive() {
   model::Model m;
@@ -29,4 +29,4 @@ inline model::Model two_ampere_drive() {
   return m;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -10,7 +10,7 @@
 
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // `more(t, q)` is a torque that is added.
 inline data::Experiment two_sines(double amplitude_rad, double drift_rad_s,
@@ -30,4 +30,4 @@ inline data::Experiment two_sines(double amplitude_rad, double drift_rad_s,
   });
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

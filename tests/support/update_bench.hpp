@@ -9,7 +9,7 @@
 #include "shared/boot/slots.hpp"
 #include "tests/support/flash_model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 inline constexpr std::size_t kSlotBytes = 768;
 inline constexpr std::string_view kTestBoard = "bench";
@@ -42,4 +42,4 @@ bool download(Slots& slots, const std::vector<std::uint8_t>& image, std::size_t 
   return slots.has_all() && slots.finish() == boot::SlotError::none;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

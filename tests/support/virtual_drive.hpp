@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <numbers>
 #include <random>
 
 #include "hil/board/drive_setup.hpp"
 #include "hil/board/virtual_drive.hpp"
+#include "shared/fixed/turn.hpp"
 
 namespace flexspline::tests {
 
@@ -26,7 +26,6 @@ using firmware::Mode;
 using firmware::N;
 using firmware::Refusal;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr std::uint32_t kTickHz = board::SoftwareBoard::kTickHz;
 
 inline const plant::Drive& demo_drive() {

@@ -10,7 +10,7 @@
 #include "shared/storage/write_once_flash.hpp"
 #include "tests/support/flash_model.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // What outlasts a power cut.
 template <std::size_t kBytes, std::size_t kCount = storage::kSectors>
@@ -138,4 +138,4 @@ class OnceFlash {
   storage::WriteOnceFlash<Model, kCount> flash_;
 };
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

@@ -7,7 +7,7 @@
 
 #include "host/input/data/dataset.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests {
 
 // Its effort is not held between samples. `fill(t, e)` appends the columns of the instant t, s.
 template <class Fill>
@@ -25,4 +25,4 @@ data::Experiment written_experiment(std::string name, double sample_s, std::size
   return e;
 }
 
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests

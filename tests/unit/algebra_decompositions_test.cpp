@@ -6,7 +6,7 @@
 #include <Eigen/Dense>
 #include <complex>
 
-namespace flexspline::algebra {
+namespace flexspline::algebra::algebra_decompositions_test {
 namespace {
 
 TEST(PivotedQr, AMatrixWithoutColumnsHasAnEmptySolutionAndSpansNothing) {
@@ -113,4 +113,4 @@ TEST(ComplexEigenvalues, OfACompanionMatrixAreTheRootsOfItsPolynomial) {
 }
 
 }  // namespace
-}  // namespace flexspline::algebra
+}  // namespace flexspline::algebra::algebra_decompositions_test

@@ -3,6 +3,7 @@
 
 #include "tests/unit/architecture_source.hpp"
 
+namespace flexspline::architecture_functions_test {
 namespace {
 
 constexpr long kMostLines = 60;
@@ -175,3 +176,4 @@ TEST(ArchitectureFunctions, LambdasArePartOfTheirs) {
 }
 
 }  // namespace
+}  // namespace flexspline::architecture_functions_test

@@ -16,6 +16,7 @@
 
 #include "tests/unit/architecture_source.hpp"
 
+namespace flexspline::architecture_test {
 namespace {
 
 using architecture::code_only;
@@ -400,3 +401,4 @@ TEST(ArchitectureRules, AFolderWithoutReadmeIsFound) {
 }
 
 }  // namespace
+}  // namespace flexspline::architecture_test

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+namespace flexspline::architecture_words_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,3 +145,4 @@ TEST(ArchitectureWords, AHeadingWithBesideIsFound) {
 }
 
 }  // namespace
+}  // namespace flexspline::architecture_words_test

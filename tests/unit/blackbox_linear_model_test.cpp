@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace flexspline::blackbox {
+namespace flexspline::blackbox::blackbox_linear_model_test {
 namespace {
 
 // y_k = -a y_{k-1} ... + b u_{k-nk} ... + c with white input, started at rest.
@@ -153,4 +153,4 @@ TEST(LinearModel, RefusesWhatCannotBeFitted) {
 }
 
 }  // namespace
-}  // namespace flexspline::blackbox
+}  // namespace flexspline::blackbox::blackbox_linear_model_test

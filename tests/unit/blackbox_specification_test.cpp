@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace flexspline::blackbox {
+namespace flexspline::blackbox::blackbox_specification_test {
 namespace {
 
 std::string refusal_of(const std::string& text) {
@@ -93,4 +93,4 @@ TEST(OrderSelection, SaysSoWhereThereIsTooLittle) {
 }
 
 }  // namespace
-}  // namespace flexspline::blackbox
+}  // namespace flexspline::blackbox::blackbox_specification_test

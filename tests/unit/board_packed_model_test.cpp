@@ -9,7 +9,7 @@
 #include "hil/board/scenario.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::board_packed_model_test {
 namespace {
 
 using board::PackedModel;
@@ -58,4 +58,4 @@ TEST(PackedModel, ForAnotherTickOrGearAndBytesThatAreNoBlockAreRefusedWithTheRea
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::board_packed_model_test

@@ -11,7 +11,7 @@
 #include "shared/boot/signature/ed25519.hpp"
 #include "tests/support/signature_cases.hpp"
 
-namespace flexspline::testing {
+namespace flexspline::tests::boot_signature_test {
 namespace {
 
 struct Vector {
@@ -230,4 +230,4 @@ TEST(BootSignature, ArithmeticHoldsNextToTheEdgesOfItsWords) {
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::boot_signature_test

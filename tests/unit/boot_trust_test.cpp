@@ -15,15 +15,15 @@
 #include "shared/boot/development_key.hpp"
 #include "tests/support/update_bench.hpp"
 
-namespace flexspline {
+namespace flexspline::boot_trust_test {
 namespace {
 
 using boot::ImageFinding;
 using boot::Slot;
 using boot::SlotError;
 using boot::Start;
-using testing::SlotCells;
-using testing::SlotFlash;
+using tests::SlotCells;
+using tests::SlotFlash;
 using LoaderSlots = boot::Slots<SlotFlash, boot::SignedBy<boot::kDevelopmentKey>>;
 using Octets = std::vector<std::uint8_t>;
 
@@ -33,7 +33,7 @@ const firmware_files::KeyPair& development_key() {
 }
 Octets signed_image(std::uint8_t name, std::uint16_t counter = 0,
                     const firmware_files::KeyPair& key = development_key()) {
-  Octets image = testing::image_named(name);
+  Octets image = tests::image_named(name);
   key.sign(image, counter);
   return image;
 }
@@ -44,7 +44,7 @@ class Drive {
   // The version that a start of the boot loader finds; zero where it finds none.
   std::uint8_t start(Start& how) {
     SlotFlash flash(cells);
-    LoaderSlots slots(flash, testing::kTestBoard);
+    LoaderSlots slots(flash, tests::kTestBoard);
     how = slots.resume();
     boot::ImageHeader header;
     if (how == Start::none || boot::read_image(slots.image(Slot::application), header) != ImageFinding::none) return 0;
@@ -57,7 +57,7 @@ class Drive {
   // The application says that it does well; it knows nothing of signatures.
   void confirm() {
     SlotFlash flash(cells);
-    testing::TestSlots application(flash, testing::kTestBoard);
+    tests::TestSlots application(flash, tests::kTestBoard);
     if (application.on_trial()) {
       EXPECT_TRUE(application.confirm());
     }
@@ -65,10 +65,10 @@ class Drive {
   // What the boot loader says to it.
   ImageFinding download(const Octets& image) {
     SlotFlash flash(cells);
-    LoaderSlots slots(flash, testing::kTestBoard);
+    LoaderSlots slots(flash, tests::kTestBoard);
     slots.keep_counter();
     if (const ImageFinding finding = slots.check_start(image); finding != ImageFinding::none) return finding;
-    return testing::download(slots, image) ? ImageFinding::none : slots.finding();
+    return tests::download(slots, image) ? ImageFinding::none : slots.finding();
   }
   void install(const Octets& image) {
     ASSERT_EQ(download(image), ImageFinding::none);
@@ -79,7 +79,7 @@ class Drive {
   }
   std::uint16_t counter() {
     SlotFlash flash(cells);
-    return LoaderSlots(flash, testing::kTestBoard).security_counter();
+    return LoaderSlots(flash, tests::kTestBoard).security_counter();
   }
   void put(Slot slot, const Octets& image) {
     std::copy(image.begin(), image.end(), cells.sectors[static_cast<std::size_t>(slot)].begin());
@@ -90,7 +90,7 @@ class Drive {
 TEST(BootTrust, WhatIsNotSignedByTheKeyIsRefusedAndTheOldImageStillStarts) {
   Drive drive;
   drive.install(signed_image('a'));
-  EXPECT_EQ(drive.download(testing::image_named('b')), ImageFinding::not_signed);
+  EXPECT_EQ(drive.download(tests::image_named('b')), ImageFinding::not_signed);
   EXPECT_EQ(drive.start(), 'a');
   EXPECT_EQ(drive.download(signed_image('b', 0, firmware_files::new_key_pair())), ImageFinding::not_signed);
   EXPECT_EQ(drive.start(), 'a');
@@ -156,13 +156,13 @@ TEST(BootTrust, WhatWasWrittenPastTheBootLoaderIsNotStarted) {
   drive.install(signed_image('b', 2));
   EXPECT_EQ(drive.start(), 'b');
   const SlotCells good = drive.cells;
-  drive.put(Slot::application, testing::image_named('x'));
+  drive.put(Slot::application, tests::image_named('x'));
   EXPECT_EQ(drive.start(), 'b') << "the download is still there";
   drive.cells = good;
   // A download with a journal that asks for its installation.
   SlotFlash flash(drive.cells);
-  testing::TestSlots application(flash, testing::kTestBoard);
-  ASSERT_TRUE(testing::download(application, testing::image_named('x', 42, testing::kTestBoard, 2)));
+  tests::TestSlots application(flash, tests::kTestBoard);
+  ASSERT_TRUE(tests::download(application, tests::image_named('x', 42, tests::kTestBoard, 2)));
   EXPECT_EQ(drive.start(), 'b');
   EXPECT_EQ(drive.start(), 'b');
   // An older image, rightly signed, is not started either.
@@ -178,7 +178,7 @@ TEST(BootTrust, WhatWasWrittenPastTheBootLoaderIsNotStarted) {
 // A drive whose boot loader was replaced by one that demands signatures.
 TEST(BootTrust, AnApplicationFromBeforeSignaturesIsReplacedByASignedOne) {
   Drive drive;
-  drive.put(Slot::application, testing::image_named('a'));
+  drive.put(Slot::application, tests::image_named('a'));
   EXPECT_EQ(drive.start(), 0);
   drive.install(signed_image('b', 1));
   EXPECT_EQ(drive.start(), 'b');
@@ -211,10 +211,10 @@ TEST(BootTrust, TheTwinTakesSignedImagesAlone) {
   auto& slots = machine.slots();
   const Octets plain = twin::twin_image({.version = {0, 2}, .is_signed = false});
   EXPECT_EQ(slots.check_start(plain), ImageFinding::not_signed);
-  EXPECT_FALSE(testing::download(slots, plain));
+  EXPECT_FALSE(tests::download(slots, plain));
   EXPECT_TRUE(machine.start());
   EXPECT_EQ(machine.version(), twin::kFactoryVersion);
-  EXPECT_TRUE(testing::download(slots, twin::twin_image({.version = {0, 3}})));
+  EXPECT_TRUE(tests::download(slots, twin::twin_image({.version = {0, 3}})));
   EXPECT_TRUE(machine.start());
   EXPECT_EQ(machine.version(), (boot::Version{0, 3}));
 }
@@ -234,4 +234,4 @@ TEST(BootTrust, TheMemoryOfAnOlderTwinStartsAnewWithTheFactorysImage) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::boot_trust_test

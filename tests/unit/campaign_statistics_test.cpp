@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace flexspline::testing {
+namespace flexspline::tests::campaign_statistics_test {
 namespace {
 
 TEST(ExactInterval, OfNoneInThreeHundredEndsWhereThatHasAChanceOfOneInForty) {
@@ -41,4 +41,4 @@ TEST(ThresholdFrom, ExponentialScoresIsAboveTheirQuantileInMostSamplesAndNotFarA
 }
 
 }  // namespace
-}  // namespace flexspline::testing
+}  // namespace flexspline::tests::campaign_statistics_test

@@ -8,7 +8,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::catalogue {
+namespace flexspline::catalogue::catalogue_constants_test {
 namespace {
 
 TEST(DriveConstants, WhatTheModelDoesNotStateChangesNothing) {
@@ -217,4 +217,4 @@ TEST(ValuesOf, AreInTheOrderOfTheCatalogueWhateverThatOfTheModel) {
 }
 
 }  // namespace
-}  // namespace flexspline::catalogue
+}  // namespace flexspline::catalogue::catalogue_constants_test

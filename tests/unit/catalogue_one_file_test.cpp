@@ -14,7 +14,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::catalogue_one_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -225,4 +225,4 @@ TEST(EffectDocuments, CatalogueHasEachEffectWithItsParametersAndRivals) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::catalogue_one_file_test

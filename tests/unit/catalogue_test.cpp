@@ -12,7 +12,7 @@
 
 #include "tests/unit/catalogue_published.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::catalogue_test {
 namespace {
 
 using catalogue::Balance;
@@ -259,4 +259,4 @@ TEST(Catalogue, SplitsListsOfNames) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::catalogue_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/commissioning_rig.hpp"
 
-namespace flexspline::commissioning_rig {
+namespace flexspline::commissioning_rig::commissioning_bounds_test {
 namespace {
 
 using commissioning::Settings;
@@ -134,4 +134,4 @@ TEST(CommissioningBounds, SettingsOutsideOfThemAreNotValid) {
 }
 
 }  // namespace
-}  // namespace flexspline::commissioning_rig
+}  // namespace flexspline::commissioning_rig::commissioning_bounds_test

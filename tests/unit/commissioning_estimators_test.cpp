@@ -7,7 +7,7 @@
 
 #include "shared/control/commissioning/estimators.hpp"
 
-namespace flexspline::control::commissioning {
+namespace flexspline::control::commissioning::commissioning_estimators_test {
 namespace {
 
 double uniform(std::mt19937_64& random, double low, double high) {
@@ -113,4 +113,4 @@ TEST(CommissioningEstimators, AnAxisThatReluctanceTurnedAwayIsPutRightAndAGoodOn
 }
 
 }  // namespace
-}  // namespace flexspline::control::commissioning
+}  // namespace flexspline::control::commissioning::commissioning_estimators_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/commissioning_faults.hpp"
 
-namespace flexspline::commissioning_rig {
+namespace flexspline::commissioning_rig::commissioning_test {
 namespace {
 
 TEST(Commissioning, FindsAMotorItsEncoderAndItsSensors) {
@@ -112,4 +112,4 @@ TEST(Commissioning, RefusesNumbersThatItCannotMeasureWith) {
 }
 
 }  // namespace
-}  // namespace flexspline::commissioning_rig
+}  // namespace flexspline::commissioning_rig::commissioning_test

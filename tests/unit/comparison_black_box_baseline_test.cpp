@@ -11,7 +11,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::comparison {
+namespace flexspline::comparison::comparison_black_box_baseline_test {
 namespace {
 
 using data::Column;
@@ -182,4 +182,4 @@ TEST(Beside, TableAndJsonShowThemAndNothingWhereNoneIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace flexspline::comparison
+}  // namespace flexspline::comparison::comparison_black_box_baseline_test

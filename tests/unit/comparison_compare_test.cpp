@@ -10,7 +10,7 @@
 #include "host/engine/comparison/score.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::comparison {
+namespace flexspline::comparison::comparison_compare_test {
 namespace {
 
 using plant::Mode;
@@ -245,4 +245,4 @@ TEST(Compare, TableHasTheWorstExperimentFirstAndThreeRegionsInWords) {
 }
 
 }  // namespace
-}  // namespace flexspline::comparison
+}  // namespace flexspline::comparison::comparison_compare_test

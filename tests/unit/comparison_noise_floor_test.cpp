@@ -11,7 +11,7 @@
 #include "tests/unit/comparison_test_drive.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::comparison {
+namespace flexspline::comparison::comparison_noise_floor_test {
 namespace {
 
 using estimation::Balance;
@@ -217,4 +217,4 @@ name = "train"
 }
 
 }  // namespace
-}  // namespace flexspline::comparison
+}  // namespace flexspline::comparison::comparison_noise_floor_test

@@ -12,7 +12,7 @@
 #include "host/engine/estimation/least_squares.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::comparison {
+namespace flexspline::comparison::comparison_residual_map_test {
 namespace {
 
 using estimation::Balance;
@@ -144,4 +144,4 @@ TEST(ResidualMap, MotorAngleStaysWithinATurn) {
 }
 
 }  // namespace
-}  // namespace flexspline::comparison
+}  // namespace flexspline::comparison::comparison_residual_map_test

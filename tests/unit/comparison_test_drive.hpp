@@ -9,7 +9,7 @@
 
 namespace flexspline::comparison {
 
-using testing::experiment_of;
+using tests::experiment_of;
 
 // The same as sensors without noise and with any resolution would have seen it.
 inline data::Experiment noiseless_experiment_of(plant::Record r, const plant::Drive& drive) {
@@ -45,7 +45,7 @@ inline data::Dataset record(const plant::Drive& drive, const std::vector<plant::
 
 // All effects that are present and not hidden, with their true values.
 inline model::Model known_model(const plant::Drive& drive) {
-  return testing::model_of(drive, false, true);
+  return tests::model_of(drive, false, true);
 }
 
 inline std::vector<const data::Experiment*> pointers(const data::Dataset& dataset) {

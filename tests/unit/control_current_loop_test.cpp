@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace flexspline::control {
+namespace flexspline::control::control_current_loop_test {
 namespace {
 
 // 0.5 ohm, 0.25 mH, 24 V, full scale 5 A, 20 kHz, corner 1000 rad/s; gains by the header's equations.
@@ -64,4 +64,4 @@ TEST(CurrentLoop, StaysWithinItsLimitAndDoesNotWindUp) {
 }
 
 }  // namespace
-}  // namespace flexspline::control
+}  // namespace flexspline::control::control_current_loop_test

@@ -16,7 +16,7 @@
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_excitation_test {
 namespace {
 
 using control::Excitation;
@@ -369,4 +369,4 @@ TEST(Excitation, TellsWhatItCannotPlay) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_excitation_test

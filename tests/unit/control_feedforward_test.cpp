@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 
 #include "host/common/numbers/real.hpp"
@@ -14,8 +13,9 @@
 #include "shared/control/trajectory.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_feedforward_test {
 namespace {
 
 using control::Feedforward;
@@ -25,7 +25,6 @@ using fixed::Fixed;
 using fixed::OverflowLog;
 using numbers::Real;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kTickS = 1.0 / 16000.0;
 constexpr double kGear = 100.0;
 constexpr double kInertia = 1e-4, kViscous = 2e-4, kCoulomb = 0.045, kRipple = 0.006, kMesh = 0.05;
@@ -343,4 +342,4 @@ TEST(Feedforward, SavesTheLoopsSevenEighthsOfTheFollowingError) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_feedforward_test

@@ -5,15 +5,15 @@
 #include <cmath>
 #include <complex>
 #include <cstdint>
-#include <numbers>
 #include <random>
 
 #include "host/common/numbers/real.hpp"
 #include "shared/control/loops.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_loops_test {
 namespace {
 
 using control::Loops;
@@ -24,7 +24,6 @@ using fixed::Fixed;
 using fixed::OverflowLog;
 using numbers::Real;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kTickS = 1.0 / 16000.0;
 constexpr double kVelocityBase = 200.0;
 constexpr double kTorqueBase = 0.5;
@@ -340,4 +339,4 @@ TEST(Loops, TellGainsAndLimitsThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_loops_test

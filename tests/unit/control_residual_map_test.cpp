@@ -13,7 +13,7 @@
 #include "shared/control/residual_map.hpp"
 #include "shared/fixed/overflow_log.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_residual_map_test {
 namespace {
 
 using control::ResidualMap;
@@ -182,4 +182,4 @@ TEST(ResidualMap, TellsSetupsThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_residual_map_test

@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 
 #include "host/common/numbers/real.hpp"
 #include "shared/control/stream.hpp"
 #include "shared/fixed/checked.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_stream_test {
 namespace {
 
 using control::Stream;
@@ -21,7 +21,6 @@ using fixed::Fixed;
 using fixed::OverflowLog;
 using numbers::Real;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kTickS = 1.0 / 20000.0;
 
 effects::DriveConstants<double> drive() {
@@ -136,4 +135,4 @@ TEST(Trajectory, TakesOverAMovingShaftAndBringsItToTheTargetWithinItsLimits) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_stream_test

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 #include <vector>
 
@@ -14,8 +13,9 @@
 #include "shared/control/trajectory.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::control_trajectory_test {
 namespace {
 
 using control::RateLimiter;
@@ -26,7 +26,6 @@ using fixed::Fixed;
 using fixed::OverflowLog;
 using numbers::Real;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kTickS = 1.0 / 16000.0;
 constexpr std::int64_t kOneTurn = std::int64_t{1} << 32;
 
@@ -253,4 +252,4 @@ TEST(RateLimiter, KeepsItsLimitsForAHundredThousandAdversarialInputsAndArrivesEx
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::control_trajectory_test

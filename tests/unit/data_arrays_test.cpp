@@ -4,7 +4,7 @@
 #include "host/input/data/recording.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_arrays_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -100,4 +100,4 @@ TEST(ArrayFiles, AMissingTimeIsNotReportedAsAMissingCurrent) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_arrays_test

@@ -9,7 +9,7 @@
 #include "host/input/data/findings.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_checks_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -310,4 +310,4 @@ TEST(IncrementRatio, IsTheSlopeAndKnowsWhenNothingMoves) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_checks_test

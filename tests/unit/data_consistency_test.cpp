@@ -3,7 +3,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_consistency_test {
 namespace {
 
 double late_velocity(double t) {
@@ -51,4 +51,4 @@ TEST(Consistency, AVelocityThatIsLateIsNamedWithItsDelay) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_consistency_test

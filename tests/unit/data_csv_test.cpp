@@ -7,7 +7,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_csv_test {
 namespace {
 
 // Forty rows of time and a current of row / 4, in the given spelling.
@@ -268,4 +268,4 @@ TEST(Csv, AFolderIsReadInTheOrderOfNames) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_csv_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_emps_test {
 namespace {
 
 std::filesystem::path emps_folder() {
@@ -81,4 +81,4 @@ TEST(Emps, UnmappedSaysWhatToMap) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_emps_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_line_order_test {
 namespace {
 
 // A hundred samples in this order.
@@ -55,4 +55,4 @@ TEST(LineOrder, RecordingsOneAfterTheOtherAreNotMixed) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_line_order_test

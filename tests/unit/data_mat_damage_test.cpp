@@ -12,7 +12,7 @@
 #include "tests/unit/data_mat_writer.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_mat_damage_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -139,4 +139,4 @@ TEST(MatDamage, SizesThatCannotBeAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_mat_damage_test

@@ -7,7 +7,7 @@
 #include "tests/unit/data_mat_writer.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_mat_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -136,10 +136,9 @@ TEST(Mat, FilesOfMachinesOfEitherByteOrderAreRead) {
   const std::vector<double> times = even_times(40, 0.5);
   for (const bool big_endian : {false, true}) {
     const TestFolder folder;
-    const fs::path file = folder.write("run.mat", flexspline::testing::Mat5Text(big_endian)
-                                                      .add("duration", times)
-                                                      .add("amperage", sampled(times, current))
-                                                      .text());
+    const fs::path file = folder.write(
+        "run.mat",
+        flexspline::tests::Mat5Text(big_endian).add("duration", times).add("amperage", sampled(times, current)).text());
     const Dataset data =
         load({mapped(folder, file, mapping("time_s", "duration", "ms") + mapping("current_a", "amperage"))});
     ASSERT_EQ(data.experiments.at(0).size(), 40u);
@@ -233,4 +232,4 @@ TEST(Mat, AMatFileOfAnyNameIsRecognizedByItsFirstBytes) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_mat_test

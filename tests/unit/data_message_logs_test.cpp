@@ -9,7 +9,7 @@
 #include "host/input/data/ros_message.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_message_logs_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,4 +120,4 @@ TEST(MessageLogs, FieldsOfAllKindsAreFoundInBothWires) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_message_logs_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace flexspline::data {
+namespace flexspline::data::data_period_test {
 namespace {
 
 constexpr std::size_t kSamples = 1000;
@@ -60,4 +60,4 @@ TEST(PeriodOfAMotion, IsNoneWhereNothingRepeatsOrNothingIsThere) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_period_test

@@ -5,7 +5,7 @@
 #include "host/input/data/csv.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_text_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -141,4 +141,4 @@ TEST(TextFiles, ASparseFileIsRefusedBeforeItIsInMemory) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_text_files_test

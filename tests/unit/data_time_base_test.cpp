@@ -7,7 +7,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_time_base_test {
 namespace {
 
 std::vector<double> jittered_times(std::size_t count, double share) {
@@ -141,4 +141,4 @@ TEST(TimeBase, SegmentsTooShortToFilterAreMaskedAndLeftOut) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_time_base_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_toml_test {
 namespace {
 
 constexpr const char* kFormatLine = "format = \"flexspline-dataset/1\"\n";
@@ -308,4 +308,4 @@ TEST(Load, HoldoutOverridesEveryRole) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_toml_test

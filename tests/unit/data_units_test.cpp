@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flexspline::data {
+namespace flexspline::data::data_units_test {
 namespace {
 
 double in_si(std::string_view unit, double value) {
@@ -82,4 +82,4 @@ TEST(Units, ListedOnesAreKnownAndOfTheirQuantity) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_units_test

@@ -3,7 +3,7 @@
 
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::data {
+namespace flexspline::data::data_whole_numbers_test {
 namespace {
 
 std::vector<double> uneven_times(std::size_t count) {
@@ -50,4 +50,4 @@ TEST(WholeNumbers, TheLikelyUnitOfTheTimeFollowsItsSteps) {
 }
 
 }  // namespace
-}  // namespace flexspline::data
+}  // namespace flexspline::data::data_whole_numbers_test

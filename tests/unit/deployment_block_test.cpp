@@ -16,7 +16,7 @@
 #include "shared/fixed/system.hpp"
 #include "shared/model/block_texts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::deployment_block_test {
 namespace {
 
 using deployment::PackError;
@@ -341,4 +341,4 @@ TEST(Pack, ProvesItsParts) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::deployment_block_test

@@ -12,7 +12,7 @@
 #include "host/drive_link/deployment/samples.hpp"
 #include "tests/support/random_model.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::deployment_error_test {
 namespace {
 
 using deployment::ErrorProof;
@@ -189,4 +189,4 @@ TEST(ErrorProof, IsAskedForByPackUnlessMeasured) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::deployment_error_test

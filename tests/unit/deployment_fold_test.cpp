@@ -11,7 +11,7 @@
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "shared/control/drive_block.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::deployment_fold_test {
 namespace {
 
 using deployment::PackError;
@@ -138,4 +138,4 @@ TEST(Fold, OfAFormulaOverOneSignalIsATableAndOverTwoIsNone) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::deployment_fold_test

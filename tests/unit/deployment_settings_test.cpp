@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <initializer_list>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,17 +12,16 @@
 #include "host/drive_link/deployment/pack.hpp"
 #include "host/physics/catalogue/constants.hpp"
 #include "shared/control/drive_block.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/two_ampere_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::deployment_settings_test {
 namespace {
 
 using deployment::PackError;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
-
 model::Model some_model() {
-  return testing::two_ampere_drive();
+  return tests::two_ampere_drive();
 }
 control::DriveSetup<double> parsed(const std::string& tables, const model::Model& m = some_model()) {
   const auto d = deployment::bases_of(m, 1.0 / 20'000.0);
@@ -209,4 +207,4 @@ TEST(DriveSettings, ComeBackFromABlock) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::deployment_settings_test

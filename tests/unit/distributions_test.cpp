@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace flexspline::numbers {
+namespace flexspline::numbers::distributions_test {
 namespace {
 
 TEST(Distributions, QuantilesAreThoseOfTheTables) {
@@ -28,4 +28,4 @@ TEST(Distributions, OfTenTossesNineOrMoreAreHeadsElevenTimesIn1024) {
 }
 
 }  // namespace
-}  // namespace flexspline::numbers
+}  // namespace flexspline::numbers::distributions_test

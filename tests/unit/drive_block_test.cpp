@@ -10,7 +10,7 @@
 #include "shared/model/block_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::drive_block_test {
 namespace {
 
 using model::BlockFault;
@@ -323,4 +323,4 @@ TEST_F(DriveBlock, StatesItsLengthAtTheStartOfAPage) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::drive_block_test

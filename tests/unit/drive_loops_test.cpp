@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+namespace flexspline::drive_loops_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,3 +76,4 @@ TEST(DriveLoops, TheRuleFindsThoseThatHaveNone) {
 }
 
 }  // namespace
+}  // namespace flexspline::drive_loops_test

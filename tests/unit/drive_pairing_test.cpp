@@ -9,7 +9,7 @@
 #include "tests/support/loopback.hpp"
 #include "tests/support/pairing_host.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::drive_pairing_test {
 namespace {
 
 using drive::PairingSigner;
@@ -78,4 +78,4 @@ TEST(DrivePairing, FirmwareThatIsOlderHasNoLock) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::drive_pairing_test

@@ -3,20 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "hil/twin/factory_block.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/protocol/map_payloads.hpp"
 #include "tests/support/loopback.hpp"
 
-namespace flexspline::drive {
+namespace flexspline::drive::drive_residual_map_test {
 namespace {
 
 using protocol::Kind;
 using protocol::Mode;
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 // A map of so many seconds at each velocity bin. Noise stays the same for kIndependent_s, as filtered noise about does.
 struct Made {
@@ -199,4 +197,4 @@ TEST(ResidualMapOverTheProtocol, BinsBeyondTheMapAndOtherActionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::drive
+}  // namespace flexspline::drive::drive_residual_map_test

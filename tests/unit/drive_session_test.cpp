@@ -9,7 +9,7 @@
 #include "host/drive_link/drive/recorder.hpp"
 #include "tests/support/loopback.hpp"
 
-namespace flexspline::drive {
+namespace flexspline::drive::drive_session_test {
 namespace {
 
 using protocol::Code;
@@ -164,4 +164,4 @@ TEST(Recorder, AVelocityBeyondThePlansLimitEndsTheRun) {
 }
 
 }  // namespace
-}  // namespace flexspline::drive
+}  // namespace flexspline::drive::drive_session_test

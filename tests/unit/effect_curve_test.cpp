@@ -7,7 +7,7 @@
 
 #include "host/output/answers/effect_curve.hpp"
 
-namespace flexspline::output {
+namespace flexspline::output::effect_curve_test {
 namespace {
 
 EffectCurve curve_of(const char* name) {
@@ -189,4 +189,4 @@ TEST(CurveText, BrailleCellsAreOfTheirBlock) {
 }
 
 }  // namespace
-}  // namespace flexspline::output
+}  // namespace flexspline::output::effect_curve_test

@@ -10,7 +10,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::effects_balances_test {
 namespace {
 
 using catalogue::Instance;
@@ -251,4 +251,4 @@ TEST(CurrentEffects, SayWhatIsMissingFromTheLoggedCurrent) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::effects_balances_test

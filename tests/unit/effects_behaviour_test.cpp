@@ -9,7 +9,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::effects_behaviour_test {
 namespace {
 
 using catalogue::Balance;
@@ -188,4 +188,4 @@ TEST(EffectsInDirection, AcceptASmoothSignBetweenMinusOneAndOne) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::effects_behaviour_test

@@ -6,7 +6,7 @@
 
 #include "tests/unit/effects_truths.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::effects_equations_test {
 namespace {
 
 // Sizes about the usual one, within bounds; signs that bounds leave open are drawn. In reduced numbers, for which the
@@ -254,4 +254,4 @@ TEST(FrictionEffects, ResistMotionAndAreZeroAtRest) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::effects_equations_test

@@ -11,7 +11,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::effects_hysteresis_test {
 namespace {
 
 using catalogue::Balance;
@@ -329,4 +329,4 @@ TEST(PreisachHysteresis, OfEqualWeightsIsSaturatedBeyondItsSpanAndSymmetric) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::effects_hysteresis_test

@@ -10,7 +10,7 @@
 
 #include "host/physics/catalogue/catalogue.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::effects_rate_form_test {
 namespace {
 
 using catalogue::Entry;
@@ -237,4 +237,4 @@ TEST(CurrentDelay, OfASteadyCurrentIsZeroWhateverTheRecordBeginsWith) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::effects_rate_form_test

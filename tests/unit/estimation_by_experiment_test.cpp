@@ -3,7 +3,7 @@
 
 #include "host/engine/estimation/by_experiment.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_by_experiment_test {
 namespace {
 
 AloneFit fit(std::string name, double value, double std) {
@@ -59,4 +59,4 @@ TEST(ByExperiment, ASumIsJudgedByItsOwnError) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_by_experiment_test

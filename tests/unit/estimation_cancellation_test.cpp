@@ -12,7 +12,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_cancellation_test {
 namespace {
 
 using plant::Mode;
@@ -96,4 +96,4 @@ TEST(Cancellation, WhatResidualsThrowComesOutOfTheSearchAsItIs) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_cancellation_test

@@ -8,7 +8,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_column_store_test {
 namespace {
 
 using What = ColumnKey::What;
@@ -90,7 +90,7 @@ TEST(ColumnKey, HoldsTheEffectsThatChangeTheInputsOfATermAndNoOthers) {
 
 // An axis that moves as a sum of two sines, with friction.
 data::Experiment moving_axis() {
-  return testing::written_experiment("sines", 1e-3, 5000, [](double t, data::Experiment& e) {
+  return tests::written_experiment("sines", 1e-3, 5000, [](double t, data::Experiment& e) {
     const double w = 6.0 * std::cos(4.0 * t) + 3.0 * std::cos(13.0 * t);
     e[data::Column::motor_position].push_back(1.5 * std::sin(4.0 * t) + 3.0 / 13.0 * std::sin(13.0 * t));
     e[data::Column::motor_torque].push_back(4e-3 * w + std::copysign(0.05, w));
@@ -101,7 +101,7 @@ class RegressorEvaluatorOfSines : public ::testing::Test {
  protected:
   void SetUp() override {
     dataset_.experiments.push_back(moving_axis());
-    found_ = identify(dataset_, testing::plain_model(), {40.0, true});
+    found_ = identify(dataset_, tests::plain_model(), {40.0, true});
     evaluator_.emplace(found_->prepared, Balance::motor);
     for (const catalogue::Entry& entry : catalogue::all()) {
       Term term = candidate_term(entry);
@@ -156,4 +156,4 @@ TEST_F(RegressorEvaluatorOfSines, ProblemsGiveTheColumnsOfTheEvaluator) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_column_store_test

@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_evidence_test {
 namespace {
 
 // y = X a + Z b + noise, where b is asked for on both balances and a is each one's own.
@@ -106,4 +106,4 @@ TEST(CombinedEvidence, ParametersOfVeryDifferentSizeAreInvertedWell) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_evidence_test

@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_identify_test {
 namespace {
 
 using data::Column;
@@ -450,4 +450,4 @@ TEST(Reconcile, AnotherKindOfAxisIsSaid) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_identify_test

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_least_squares_test {
 namespace {
 
 using Exact = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
@@ -202,4 +202,4 @@ TEST(AutocorrelationTimeOfRecords, IsThatOfAFirstOrderProcessAndOneForWhiteNoise
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_least_squares_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_model_projection_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -59,4 +59,4 @@ TEST(ModelProjectionOf, RowsWithoutWeightCountForNothing) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_model_projection_test

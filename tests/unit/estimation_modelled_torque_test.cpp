@@ -9,15 +9,15 @@
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/add.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_modelled_torque_test {
 namespace {
 
 using data::Column;
 
-constexpr double kTurn = 6.283185307179586;
 constexpr double kRatio = 80.0, kInertia = 2e-4, kViscous = 2e-3, kDry = 0.04;
 constexpr double kWeight_nm = 30.0, kLoadFriction = 0.15, kNoise_nm = 1e-3;
 
@@ -28,8 +28,8 @@ data::Dataset swinging_arm() {
   data::Dataset dataset;
   for (const double frequency_hz : {0.11, 0.19, 0.27}) {
     const double rate = kTurn * frequency_hz;
-    dataset.experiments.push_back(testing::written_experiment(
-        "at " + std::to_string(frequency_hz), 2e-3, 8000, [&](double t, data::Experiment& e) {
+    dataset.experiments.push_back(
+        tests::written_experiment("at " + std::to_string(frequency_hz), 2e-3, 8000, [&](double t, data::Experiment& e) {
           const double q = 130.0 * std::sin(rate * t), w = 130.0 * rate * std::cos(rate * t), a = -rate * rate * q;
           const double weight = kWeight_nm * std::sin(q / kRatio), carried = weight + kRatio * kInertia * a;
           const double sign = w > 0.0 ? 1.0 : -1.0;
@@ -57,7 +57,7 @@ double torque_of_unit() {
 }
 
 TEST(ModelledTorque, FrictionThatGrowsWithTheLoadIsIdentifiedWithoutATorqueSensor) {
-  const auto found = identify(swinging_arm(), testing::plain_model_with({"gravity", "load_dependent_friction"}), {});
+  const auto found = identify(swinging_arm(), tests::plain_model_with({"gravity", "load_dependent_friction"}), {});
   const auto value = [&](const char* effect, const char* parameter) {
     for (const Estimate& e : found->estimates)
       if (e.effect == effect && e.parameter == parameter) return e.value;
@@ -71,7 +71,7 @@ TEST(ModelledTorque, FrictionThatGrowsWithTheLoadIsIdentifiedWithoutATorqueSenso
 
 TEST(ModelledTorque, AddedLoadFrictionTakesTheErrorOnHeldOutDataToTheNoise) {
   const selection::Addition added =
-      selection::add(swinging_arm(), testing::plain_model_with({"gravity"}), "load_dependent_friction", {});
+      selection::add(swinging_arm(), tests::plain_model_with({"gravity"}), "load_dependent_friction", {});
   ASSERT_TRUE(added.before.rmse_holdout && added.after.rmse_holdout);
   EXPECT_GT(*added.before.rmse_holdout, 8.0 * *added.after.rmse_holdout);
   EXPECT_LT(*added.after.rmse_holdout, 1.5 * kNoise_nm);
@@ -82,7 +82,7 @@ TEST(ModelledTorque, AddedLoadFrictionTakesTheErrorOnHeldOutDataToTheNoise) {
 }
 
 TEST(ModelledTorque, SetTwiceIsSetOnce) {
-  const auto found = identify(swinging_arm(), testing::plain_model_with({"gravity", "load_dependent_friction"}), {});
+  const auto found = identify(swinging_arm(), tests::plain_model_with({"gravity", "load_dependent_friction"}), {});
   PreparedData again = found->prepared;
   ASSERT_TRUE(take_torque_where_read(again, found->terms));
   PreparedData twice = again;
@@ -93,14 +93,14 @@ TEST(ModelledTorque, SetTwiceIsSetOnce) {
 }
 
 TEST(ModelledTorque, IsNotMadeWithoutAWeightOrWhereNothingReadsIt) {
-  const auto no_weight = identify(swinging_arm(), testing::plain_model_with({"load_dependent_friction"}), {});
+  const auto no_weight = identify(swinging_arm(), tests::plain_model_with({"load_dependent_friction"}), {});
   PreparedData prepared = no_weight->prepared;
   EXPECT_FALSE(take_torque_from_load(prepared, no_weight->terms));
-  const auto no_reader = identify(swinging_arm(), testing::plain_model_with({"gravity"}), {});
+  const auto no_reader = identify(swinging_arm(), tests::plain_model_with({"gravity"}), {});
   prepared = no_reader->prepared;
   EXPECT_FALSE(take_torque_where_read(prepared, no_reader->terms));
   EXPECT_TRUE(prepared.records.front().inputs.torque.empty());
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_modelled_torque_test

@@ -9,7 +9,7 @@
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/record_variance.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_noise_covariance_test {
 namespace {
 
 // Two records of five and seven rows; the second varies along two directions, the first along one.
@@ -99,4 +99,4 @@ TEST(FrictionGroups, KnowWhatDoesNotVaryWithTheFriction) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_noise_covariance_test

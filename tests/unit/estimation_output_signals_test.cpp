@@ -6,15 +6,15 @@
 
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/estimation/reversal_mask.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_output_signals_test {
 namespace {
 
 using data::Column;
 
-constexpr double kTurn = 6.283185307179586;
 constexpr double kRatio = 50.0, kStiffness = 2e4;                 // N m/rad
 constexpr double kLoad_nm = 4.0, kOffset_nm = 0.9, kStep = 2e-5;  // of the sensor; of the output encoder, rad
 
@@ -29,8 +29,8 @@ data::Dataset loaded_axis(const Sensors& sensors) {
   data::Dataset dataset;
   for (const double frequency_hz : {0.4, 0.7}) {
     const double rate = kTurn * frequency_hz;
-    dataset.experiments.push_back(testing::written_experiment(
-        frequency_hz < 0.5 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+    dataset.experiments.push_back(
+        tests::written_experiment(frequency_hz < 0.5 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
           const double q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t), a = -rate * rate * q;
           const double torque = kLoad_nm * std::sin(0.31 * kTurn * t);
           e[Column::motor_position].push_back(q);
@@ -46,7 +46,7 @@ data::Dataset loaded_axis(const Sensors& sensors) {
 }
 
 TEST(SensorOffset, IsIdentifiedOnTheMotorBalanceWhereNoTorsionIsMeasured) {
-  const auto found = identify(loaded_axis({}), testing::plain_model_with({"torque_offset"}), {});
+  const auto found = identify(loaded_axis({}), tests::plain_model_with({"torque_offset"}), {});
   const auto offset = std::find_if(found->estimates.begin(), found->estimates.end(),
                                    [](const Estimate& e) { return e.effect == "torque_offset"; });
   ASSERT_NE(offset, found->estimates.end());
@@ -67,7 +67,7 @@ TEST(SensorOffset, StaysOnTheTransmissionBalanceWhereATorsionIsMeasured) {
 TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
   // The torsion is 200 urad in all, so that its rate is far below the noise of a difference of two velocities.
   const auto found = identify(loaded_axis({.has_output_position = true}),
-                              testing::plain_model_with({"linear_stiffness", "torque_offset"}), {});
+                              tests::plain_model_with({"linear_stiffness", "torque_offset"}), {});
   EXPECT_TRUE(found->prepared.pipeline.keep_torsion_reversals);
   const auto stiffness = std::find_if(found->estimates.begin(), found->estimates.end(),
                                       [](const Estimate& e) { return e.effect == "linear_stiffness"; });
@@ -79,7 +79,7 @@ TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
 bool leaves_too_little(double share) {
   const data::Dataset dataset = loaded_axis({.has_output_position = true});
   PreparedData prepared =
-      identify(dataset, testing::plain_model_with({"linear_stiffness", "torque_offset"}), {})->prepared;
+      identify(dataset, tests::plain_model_with({"linear_stiffness", "torque_offset"}), {})->prepared;
   for (Record& r : prepared.records) {
     std::vector<std::size_t>& samples = r.rows[static_cast<std::size_t>(Balance::transmission)].samples;
     samples.clear();
@@ -99,4 +99,4 @@ TEST(NoisyTorsion, IsOneOfWhichTheMaskLeavesLessThanAFifthOfTheSquares) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_output_signals_test

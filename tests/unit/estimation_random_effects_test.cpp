@@ -11,7 +11,7 @@
 #include "host/engine/estimation/noise_covariance.hpp"
 #include "host/engine/estimation/random_effects.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_random_effects_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -186,4 +186,4 @@ TEST(NoiseCovarianceOfOneRecord, MakesTheDenseCovarianceTheIdentity) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_random_effects_test

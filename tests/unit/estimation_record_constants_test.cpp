@@ -8,7 +8,7 @@
 #include "host/engine/comparison/compare.hpp"
 #include "host/engine/estimation/identify.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_record_constants_test {
 namespace {
 
 using data::Column;
@@ -99,4 +99,4 @@ TEST(TorsionZero, OfRecordsThatWereNotFittedIsFoundByCompare) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_record_constants_test

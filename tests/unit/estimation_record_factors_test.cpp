@@ -9,7 +9,7 @@
 
 #include "host/engine/estimation/random_effects.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_record_factors_test {
 namespace {
 
 using data::Column;
@@ -118,4 +118,4 @@ TEST(MixedModel, WithoutRandomEffectsIsLeastSquaresWeighedByTheNoiseOfEachRecord
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_record_factors_test

@@ -11,7 +11,7 @@
 #include "host/common/signals/differentiate.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_record_signals_test {
 namespace {
 
 using Inputs = RecordSignals::Inputs;
@@ -150,4 +150,4 @@ TEST(RecordSignals, FormulasReadWhatTheyName) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_record_signals_test

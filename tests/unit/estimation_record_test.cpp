@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_record_test {
 namespace {
 
 using data::Column;
@@ -324,4 +324,4 @@ TEST(Prepare, WithoutACutOffPositionsAreFilteredWiderThanRowsAndTheReasonIsTold)
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_record_test

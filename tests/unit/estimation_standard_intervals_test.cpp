@@ -10,7 +10,7 @@
 #include "host/common/signals/butterworth.hpp"
 #include "host/engine/estimation/regressor_noise.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_standard_intervals_test {
 namespace {
 
 using data::Column;
@@ -123,4 +123,4 @@ TEST(RegressorNoise, IsNothingWhereThePositionIsExact) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_standard_intervals_test

@@ -1,4 +1,5 @@
 #include "host/engine/estimation/strokes.hpp"
+#include "shared/fixed/turn.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +7,10 @@
 #include <numeric>
 #include <random>
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_strokes_test {
 namespace {
 
 using data::Column;
-
-constexpr double kTurn = 6.283185307179586;
 
 // Whole periods of a sine of the motor's angle, from one end to the other, with noise on the angle.
 Record swinging(double amplitude_rad, double frequency_hz, double noise_rad) {
@@ -55,4 +54,4 @@ TEST(Strokes, QuantileCountsTravelAndNotStrokes) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_strokes_test

@@ -7,12 +7,12 @@
 
 #include "tests/support/noisy_motor.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_test {
 namespace {
 
 using estimation::Estimate;
-using testing::noisy_motion;
-using testing::NoisyMotor;
+using tests::noisy_motion;
+using tests::NoisyMotor;
 
 data::Dataset recorded(const NoisyMotor& motor, std::uint64_t seed = 5) {
   data::Dataset dataset;
@@ -57,7 +57,7 @@ TEST(Estimate, EveryMethodFindsTheTruthInDataWithoutNoise) {
        {Method::ls, Method::nls, Method::partitioned, Method::instruments, Method::output_error}) {
     Options how;
     how.method = method;
-    const auto found = estimate(recorded(motor), testing::motor_model(motor), kFilters, how);
+    const auto found = estimate(recorded(motor), tests::motor_model(motor), kFilters, how);
     EXPECT_NEAR(of(*found, "inertia").value / motor.inertia, 1.0, 2e-3) << name_of(method);
     EXPECT_NEAR(of(*found, "viscous_friction").value / motor.viscous, 1.0, 1e-2) << name_of(method);
     EXPECT_NEAR(of(*found, "coulomb_friction").value / motor.coulomb, 1.0, 3e-3) << name_of(method);
@@ -70,7 +70,7 @@ TEST(Estimate, TheFreeRunDoesNotBeginAtTheNoiseOfTheFirstSample) {
   for (data::Experiment& e : dataset.experiments) e[data::Column::motor_velocity][0] += 20.0;  // rad/s, one sample
   Options how;
   how.method = Method::output_error;
-  const auto found = estimate(dataset, testing::motor_model(motor), kFilters, how);
+  const auto found = estimate(dataset, tests::motor_model(motor), kFilters, how);
   EXPECT_NEAR(of(*found, "inertia").value / motor.inertia, 1.0, 2e-3);
   EXPECT_NEAR(of(*found, "coulomb_friction").value / motor.coulomb, 1.0, 5e-3);
 }
@@ -78,7 +78,7 @@ TEST(Estimate, TheFreeRunDoesNotBeginAtTheNoiseOfTheFirstSample) {
 // Report 3.6: with the torque constant open as well, any multiple of a solution is one.
 TEST(Estimate, AnOpenScaleIsSaidAndOneSuppliedParameterClosesIt) {
   const NoisyMotor motor = quiet();
-  model::Model model = testing::motor_model(motor);
+  model::Model model = tests::motor_model(motor);
   model.drive.torque_constant_nm_a.value = motor.torque_constant / 1.1;
   model.effects.push_back(catalogue::blank_effect(catalogue::get("torque_constant_error"), model.drive.axis));
   const auto open = estimate(recorded(motor), model, kFilters);
@@ -94,7 +94,7 @@ TEST(Estimate, AnOpenScaleIsSaidAndOneSuppliedParameterClosesIt) {
 }
 
 TEST(Estimate, SuppliedParametersThatAreNotThereAreRefusedWithTheNamesThatAre) {
-  model::Model model = testing::motor_model({});
+  model::Model model = tests::motor_model({});
   EXPECT_NE(refusal([&] {
               supply(model, {"gravity", "sine", 1.0});
             }).find("it has inertia, viscous_friction"),
@@ -105,7 +105,7 @@ TEST(Estimate, SuppliedParametersThatAreNotThereAreRefusedWithTheNamesThatAre) {
 }
 
 TEST(Estimate, LeastSquaresAloneRefusesFreeShapes) {
-  model::Model model = testing::motor_model({});
+  model::Model model = tests::motor_model({});
   model.effects.push_back(catalogue::blank_effect(catalogue::get("stribeck_gaussian"), model.drive.axis));
   EXPECT_EQ(method_for(model), Method::nls);
   Options how;
@@ -118,7 +118,7 @@ TEST(Estimate, LeastSquaresAloneRefusesFreeShapes) {
 TEST(Estimate, ThePartitionKeepsItsLinearParametersThroughTheSearchForShapes) {
   NoisyMotor motor = quiet();
   motor.noise_share = 0.002;
-  model::Model model = testing::motor_model(motor);
+  model::Model model = tests::motor_model(motor);
   Options how;
   how.method = Method::partitioned;
   const auto plain = estimate(recorded(motor), model, kFilters, how);
@@ -133,10 +133,10 @@ TEST(Estimate, ThePartitionKeepsItsLinearParametersThroughTheSearchForShapes) {
 TEST(Estimate, ProfileIntervalsAgreeWithStandardErrorsForALinearModel) {
   NoisyMotor motor = quiet();
   motor.noise_share = 0.01;
-  const auto standard = estimate(recorded(motor), testing::motor_model(motor), kFilters);
+  const auto standard = estimate(recorded(motor), tests::motor_model(motor), kFilters);
   Options how;
   how.intervals = Intervals::profile;
-  const auto profile = estimate(recorded(motor), testing::motor_model(motor), kFilters, how);
+  const auto profile = estimate(recorded(motor), tests::motor_model(motor), kFilters, how);
   for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"}) {
     const Estimate &s = of(*standard, name), &p = of(*profile, name);
     EXPECT_EQ(s.value, p.value);
@@ -155,10 +155,10 @@ TEST(Estimate, BootstrapIntervalsHoldTheTruthAndComeOutTheSameForASeed) {
   Options how;
   how.intervals = Intervals::bootstrap;
   how.replicates = 60;
-  const auto once = estimate(recorded(motor), testing::motor_model(motor), kFilters, how);
-  const auto again = estimate(recorded(motor), testing::motor_model(motor), kFilters, how);
+  const auto once = estimate(recorded(motor), tests::motor_model(motor), kFilters, how);
+  const auto again = estimate(recorded(motor), tests::motor_model(motor), kFilters, how);
   how.seed = 2;
-  const auto other = estimate(recorded(motor), testing::motor_model(motor), kFilters, how);
+  const auto other = estimate(recorded(motor), tests::motor_model(motor), kFilters, how);
   for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"}) {
     const Estimate& e = of(*once, name);
     ASSERT_TRUE(e.low && e.high);
@@ -172,7 +172,7 @@ TEST(Estimate, BootstrapIntervalsHoldTheTruthAndComeOutTheSameForASeed) {
 
 TEST(Estimate, ExcitationIsTheShareThatNoOtherParameterStandsInFor) {
   const NoisyMotor motor = quiet();
-  const auto found = estimate(recorded(motor), testing::motor_model(motor), kFilters);
+  const auto found = estimate(recorded(motor), tests::motor_model(motor), kFilters);
   for (const char* name : {"inertia", "viscous_friction", "coulomb_friction"}) {
     ASSERT_TRUE(of(*found, name).excitation);
     EXPECT_GT(*of(*found, name).excitation, 0.05) << name;
@@ -185,9 +185,9 @@ TEST(Estimate, ExcitationIsTheShareThatNoOtherParameterStandsInFor) {
       e[data::Column::motor_velocity][k] = 50.0 + 1e-3 * std::sin(0.05 * static_cast<double>(k));
       e[data::Column::current][k] = (motor.coulomb + 50.0 * motor.viscous) / motor.torque_constant;
     }
-  const auto poor = estimate(steady, testing::motor_model(motor), kFilters);
+  const auto poor = estimate(steady, tests::motor_model(motor), kFilters);
   EXPECT_LT(of(*poor, "viscous_friction").excitation.value_or(0.0), 1e-3);
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_test

@@ -11,11 +11,11 @@
 #include "host/engine/estimation/minimise.hpp"
 #include "tests/support/plain_model.hpp"
 
-namespace flexspline::estimation {
+namespace flexspline::estimation::estimation_variable_projection_test {
 namespace {
 
 using data::Column;
-using testing::plain_model;
+using tests::plain_model;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInertia = 1e-3, kViscous = 4e-3, kCoulomb = 0.05;
@@ -223,4 +223,4 @@ TEST(Minimise, WhatStandsAtABoundDoesNotHoldUpTheOthers) {
 }
 
 }  // namespace
-}  // namespace flexspline::estimation
+}  // namespace flexspline::estimation::estimation_variable_projection_test

@@ -10,7 +10,7 @@
 #include "host/engine/estimation/identify.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
-namespace flexspline {
+namespace flexspline::estimation_zero_order_hold_test {
 namespace {
 
 using data::Column;
@@ -105,4 +105,4 @@ TEST(ZeroOrderHold, NothingIsAddedWhereTheEffortIsNotHeld) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::estimation_zero_order_hold_test

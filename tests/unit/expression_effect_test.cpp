@@ -12,7 +12,7 @@
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "host/physics/simulation/balances.hpp"
 
-namespace flexspline::catalogue {
+namespace flexspline::catalogue::expression_effect_test {
 namespace {
 
 using data::Column;
@@ -248,4 +248,4 @@ TEST(Expression, ShapesOfAFormulaAreFoundAsThoseOfTheEffectThatItWrites) {
 }
 
 }  // namespace
-}  // namespace flexspline::catalogue
+}  // namespace flexspline::catalogue::expression_effect_test

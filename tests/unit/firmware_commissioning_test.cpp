@@ -17,7 +17,7 @@
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_commissioning_test {
 namespace {
 
 using protocol::Code;
@@ -104,7 +104,7 @@ struct Bench {
 };
 
 TEST(FirmwareCommissioning, FindsTheMotorThatTheTwinDrew) {
-  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tests::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     ASSERT_EQ(bench.begin(), Code::done);
@@ -164,7 +164,7 @@ TEST(FirmwareCommissioning, EachWiringFaultOfTheTwinIsNamedWithItsPhase) {
   for (std::size_t i = 0; i < std::size(kAll); ++i) {
     // Of a fault that each phase can have one phase by turns, in the whole campaign all.
     const std::size_t kind = i / 3, phase = i % 3;
-    if (kind < 4 && phase != kind % 3 && !testing::whole_campaigns()) continue;
+    if (kind < 4 && phase != kind % 3 && !tests::whole_campaigns()) continue;
     const Expected& e = kAll[i];
     Bench bench(e.fault);
     ASSERT_EQ(bench.begin(), Code::done) << e.fault;
@@ -331,7 +331,7 @@ TEST(FirmwareCommissioning, AStopADisarmALostLinkASilentHostAndAProtectionOpenTh
 }
 
 TEST(FirmwareCommissioning, TheDriveKeepsItsMotorOverAPowerCutAndFollowsWithIt) {
-  for (std::uint64_t seed = 1; seed <= testing::in_campaign<std::uint64_t>(2, 4); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tests::in_campaign<std::uint64_t>(2, 4); ++seed) {
     Bench bench("", seed);
     const auto setup = bench.setup();
     const auto stage = bench.ask<protocol::CommissioningStage>(Kind::commissioning_stage);
@@ -400,4 +400,4 @@ TEST(FirmwareCommissioning, ABlockWithAMotorOutsideItsBoundsIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_commissioning_test

@@ -7,7 +7,7 @@
 
 #include "firmware/service.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_drive_test {
 namespace {
 
 // Writes down what is polled.
@@ -55,4 +55,4 @@ TEST(DriveInfo, NamesAreCutToWhatTheMessageHoldsAndEndWithAZero) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_drive_test

@@ -12,7 +12,7 @@
 #include "firmware/fault_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_faults_test {
 namespace {
 
 using firmware::SafeState;
@@ -320,4 +320,4 @@ TEST(Fault, EachHasANameOfItsOwnAReasonAndAStatedTime) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_faults_test

@@ -9,7 +9,7 @@
 #include "tests/support/service_host.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_host_errors_test {
 namespace {
 
 std::string fault_of(const VirtualDrive& drive) {
@@ -139,4 +139,4 @@ TEST(HostErrors, NewParametersLeaveTheAngleWhereItIsHoweverOftenTheCounterWrappe
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_host_errors_test

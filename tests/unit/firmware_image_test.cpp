@@ -6,7 +6,7 @@
 
 #include "host/drive_link/firmware/image_file.hpp"
 
-namespace flexspline::firmware_files {
+namespace flexspline::firmware_files::firmware_image_test {
 namespace {
 
 Bytes program() {
@@ -87,4 +87,4 @@ TEST(FirmwareImage, WhatCannotBecomeAnImageIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::firmware_files
+}  // namespace flexspline::firmware_files::firmware_image_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_map_test {
 namespace {
 
 using firmware::MapBin;
@@ -114,4 +114,4 @@ TEST(ResidualMapOnTheDrive, NeedsParametersAndHasNoBinBeyondItsLast) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_map_test

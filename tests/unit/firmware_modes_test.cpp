@@ -7,7 +7,7 @@
 
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_modes_test {
 namespace {
 
 TEST(Modes, ADriveIsIdleOnceItsSensorsWereFoundGoodForAWhile) {
@@ -234,4 +234,4 @@ TEST(Modes, WithoutAnEncoderAtTheOutputItIsEstimatedCloserThanAStiffGearWouldBe)
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_modes_test

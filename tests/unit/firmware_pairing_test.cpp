@@ -11,7 +11,7 @@
 #include "tests/support/pairing_host.hpp"
 #include "tests/support/service_host.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_pairing_test {
 namespace {
 
 using protocol::Access;
@@ -166,4 +166,4 @@ TEST(Pairing, TelemetryArmingSetPointsAndThePositionStayFree) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_pairing_test

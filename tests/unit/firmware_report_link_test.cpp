@@ -6,7 +6,7 @@
 
 #include "hil/twin/twin_drive.hpp"
 
-namespace flexspline {
+namespace flexspline::firmware_report_link_test {
 namespace {
 
 using protocol::Code;
@@ -119,4 +119,4 @@ TEST(ReportLink, AHostThatDoesNotPollLosesFramesThatAreCountedAndNoAnswer) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::firmware_report_link_test

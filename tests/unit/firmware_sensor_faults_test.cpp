@@ -4,7 +4,7 @@
 
 #include "tests/support/sensor_fault_cells.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_sensor_faults_test {
 namespace {
 
 std::string fault_of(const SensorFaultOutcome& o) {
@@ -79,4 +79,4 @@ TEST(SensorFaults, ATorqueThatABlockedOutputHoldsForSecondsIsNoFaultInModeCurren
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_sensor_faults_test

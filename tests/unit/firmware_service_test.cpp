@@ -16,7 +16,7 @@
 #include "shared/protocol/texts.hpp"
 #include "tests/support/service_host.hpp"
 
-namespace flexspline {
+namespace flexspline::firmware_service_test {
 namespace {
 
 using protocol::Code;
@@ -371,4 +371,4 @@ TEST(Service, WhateverAHostSendsCurrentAndVelocityStayWithinTheLimitsOfTheParame
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::firmware_service_test

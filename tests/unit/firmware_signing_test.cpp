@@ -9,7 +9,7 @@
 #include "host/drive_link/firmware/signing.hpp"
 #include "shared/boot/development_key.hpp"
 
-namespace flexspline::firmware_files {
+namespace flexspline::firmware_files::firmware_signing_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -145,4 +145,4 @@ TEST_F(FirmwareKeys, WhatIsNoKeyOrOthersMayReadIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::firmware_files
+}  // namespace flexspline::firmware_files::firmware_signing_test

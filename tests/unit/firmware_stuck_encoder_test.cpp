@@ -7,7 +7,7 @@
 #include "firmware/fault_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_stuck_encoder_test {
 namespace {
 
 std::string fault_of(const VirtualDrive& drive) {
@@ -98,4 +98,4 @@ TEST(StuckEncoder, IsFoundWithinTheStatedTimeWhereTheShaftStoodBefore) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_stuck_encoder_test

@@ -11,7 +11,7 @@
 #include "shared/model/block_texts.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::firmware_telemetry_test {
 namespace {
 
 using firmware::BlockFinding;
@@ -265,4 +265,4 @@ TEST(ParameterBlock, ThatWasDamagedInFlashLeavesADriveThatCannotBeArmed) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::firmware_telemetry_test

@@ -3,7 +3,7 @@
 
 #include "tests/support/drive_trial.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::fixed_effects_test {
 namespace {
 
 constexpr double kBoundOfAnEffect = 1e-6;  // of rated torque
@@ -128,4 +128,4 @@ TEST(DriveModel, SlowMotionMovesAStateThatASignalCouldNotShow) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::fixed_effects_test

@@ -13,7 +13,7 @@
 
 #include "shared/fixed/system.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::fixed_elementary_test {
 namespace {
 
 using fixed::Fixed;
@@ -269,4 +269,4 @@ TEST(FixedFunctions, TheQExponentialIsWithinItsErrorAndHasNoGapAtOne) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::fixed_elementary_test

@@ -8,7 +8,7 @@
 #include "shared/fixed/bits.hpp"
 #include "shared/fixed/word.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::fixed_limits_test {
 namespace {
 
 __extension__ using Wide = __int128;
@@ -50,4 +50,4 @@ TEST(Limits, AProductWithAWordRoundsAsTheLongOneDoes) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::fixed_limits_test

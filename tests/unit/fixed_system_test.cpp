@@ -11,7 +11,7 @@
 #include "shared/fixed/intervals.hpp"
 #include "shared/fixed/system.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::fixed_system_test {
 namespace {
 
 using fixed::Checked;
@@ -312,4 +312,4 @@ TEST_F(IntervalsHold, EveryFunctionOfStatesAndTravels) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::fixed_system_test

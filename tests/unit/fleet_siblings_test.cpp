@@ -7,7 +7,7 @@
 
 #include "host/app/fleet/siblings.hpp"
 
-namespace flexspline::fleet {
+namespace flexspline::fleet::fleet_siblings_test {
 namespace {
 
 std::vector<DriveResult> gaussian_fleet(std::mt19937_64& random, std::size_t drives, std::size_t quantities) {
@@ -95,4 +95,4 @@ TEST(FleetSiblings, ADamagedResultIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace flexspline::fleet
+}  // namespace flexspline::fleet::fleet_siblings_test

@@ -11,7 +11,7 @@
 
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::foc_rig {
+namespace flexspline::foc_rig::foc_current_test {
 namespace {
 
 // The design's response as the samples show it: it begins half a period after the one at which the set point steps.
@@ -158,4 +158,4 @@ TEST(FocCurrentLoop, WithoutVoltageForBothTheFluxAxisHasItFirst) {
 }
 
 }  // namespace
-}  // namespace flexspline::foc_rig
+}  // namespace flexspline::foc_rig::foc_current_test

@@ -11,7 +11,7 @@
 #include "tests/counts/float_current_loop.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::foc_rig {
+namespace flexspline::foc_rig::foc_example_test {
 namespace {
 
 Bench example_bench() {
@@ -112,4 +112,4 @@ TEST(FocExample, WithTheGainsOfALowRateItDoesSoWithinTheLimitOfTheVoltage) {
 }
 
 }  // namespace
-}  // namespace flexspline::foc_rig
+}  // namespace flexspline::foc_rig::foc_example_test

@@ -6,14 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
+#include "shared/fixed/turn.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::foc_rig {
+namespace flexspline::foc_rig::foc_limits_test {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 deployment::FocLimitSetup limits_of() {
   deployment::FocLimitSetup l;
@@ -126,4 +124,4 @@ TEST(FocLimits, FieldWeakeningKeepsTheTorqueAboveTheSpeedAtWhichTheVoltageEnds) 
 }
 
 }  // namespace
-}  // namespace flexspline::foc_rig
+}  // namespace flexspline::foc_rig::foc_limits_test

@@ -8,15 +8,14 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
-#include <numbers>
 
+#include "shared/fixed/turn.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::foc_rig {
+namespace flexspline::foc_rig::foc_modulation_test {
 namespace {
 
 constexpr int kCounts = 1 << 20;  // so that counts do not hide what the duties are
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 foc::ModulationSettings bare_settings(double pulse = 0.0, double window = 0.0) {
   foc::ModulationSettings c;
@@ -205,4 +204,4 @@ TEST(FocDeadTime, TheLargerGainsOfALowRateLeaveLessThanAHundredthOfItAndCompensa
 }
 
 }  // namespace
-}  // namespace flexspline::foc_rig
+}  // namespace flexspline::foc_rig::foc_modulation_test

@@ -12,7 +12,7 @@
 #include "hil/motor/motor.hpp"
 #include "shared/control/foc/phase_currents.hpp"
 
-namespace flexspline::control::foc {
+namespace flexspline::control::foc::foc_transforms_test {
 namespace {
 
 constexpr double kCurrent = 0x1p-27;
@@ -137,4 +137,4 @@ TEST(FocPhaseCurrents, CalibrationNamesThePhaseWhoseOffsetIsTooLargeOrWhoseCurre
 }
 
 }  // namespace
-}  // namespace flexspline::control::foc
+}  // namespace flexspline::control::foc::foc_transforms_test

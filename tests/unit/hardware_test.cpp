@@ -12,7 +12,7 @@
 #include "tests/support/two_ampere_drive.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::hardware_test {
 namespace {
 
 using control::Hardware;
@@ -142,7 +142,7 @@ TEST(BoardHardware, PackTakesWhatTheBoardStatesAndSaysWhichSettingDisagrees) {
                         .amplifier_full_scale_ma = 5000,
                         .most_current_ma = 5000,
                         .torque_sensor = control::SensorKind::none};
-  const model::Model m = testing::two_ampere_drive();
+  const model::Model m = tests::two_ampere_drive();
   const auto d = deployment::bases_of(m, 1.0 / kTickHz);
   const auto setup = [&](const std::string& tables, const Hardware& hardware) {
     return deployment::parse_drive_setup("format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 16384\n" + tables,
@@ -172,4 +172,4 @@ TEST(BoardHardware, PackTakesWhatTheBoardStatesAndSaysWhichSettingDisagrees) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::hardware_test

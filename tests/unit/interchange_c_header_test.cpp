@@ -14,7 +14,7 @@
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "host/physics/simulation/balances.hpp"
 
-namespace flexspline::interchange {
+namespace flexspline::interchange::interchange_c_header_test {
 namespace {
 
 using simulation::Balances;
@@ -206,4 +206,4 @@ TEST(CHeader, NamesAreThoseOfCWhateverTheModelIsCalled) {
 }
 
 }  // namespace
-}  // namespace flexspline::interchange
+}  // namespace flexspline::interchange::interchange_c_header_test

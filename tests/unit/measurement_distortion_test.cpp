@@ -7,11 +7,11 @@
 #include "host/engine/measurement/distortion.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
-namespace flexspline::measurement {
+namespace flexspline::measurement::measurement_distortion_test {
 namespace {
 
 using data::Column;
-using testing::Line;
+using tests::Line;
 
 constexpr double kSample = 1e-3;
 constexpr double kPeriod = 1.0;
@@ -63,18 +63,18 @@ Truth truth_of(const std::vector<Line>& lines, double quadratic, double cubic) {
 
 Distortion distortion_in(const std::vector<Line>& lines, double quadratic, double cubic, double noise) {
   const std::size_t n = 6 * 1000 + 20;
-  data::Experiment e = testing::experiment_of(n, kSample);
-  e[Column::current] = testing::signal_of(lines, kPeriod, kSample, n);
+  data::Experiment e = tests::experiment_of(n, kSample);
+  e[Column::current] = tests::signal_of(lines, kPeriod, kSample, n);
   std::vector<double> y;
   for (const double x : e[Column::current]) y.push_back(x + quadratic * x * x + cubic * x * x * x);
-  if (noise > 0.0) testing::add_noise(y, noise, 9);
+  if (noise > 0.0) tests::add_noise(y, noise, 9);
   const Period period = *find_period(e).period;
-  return distortion_of(testing::channel(e[Column::current]), testing::channel(y, "y"), period, kSample,
+  return distortion_of(tests::channel(e[Column::current]), tests::channel(y, "y"), period, kSample,
                        excited_lines(e, period));
 }
 
 TEST(Distortion, OfACubeIsOddAtThePredictedLevel) {
-  const auto lines = testing::multisine(kHighest, 0.1, 5);
+  const auto lines = tests::multisine(kHighest, 0.1, 5);
   const double cubic = 0.3;
   const Truth truth = truth_of(lines, 0.0, cubic);
   const Distortion d = distortion_in(lines, 0.0, cubic, 1e-4);
@@ -90,7 +90,7 @@ TEST(Distortion, OfACubeIsOddAtThePredictedLevel) {
 }
 
 TEST(Distortion, OfASquareIsEvenAtThePredictedLevel) {
-  const auto lines = testing::multisine(kHighest, 0.1, 6);
+  const auto lines = tests::multisine(kHighest, 0.1, 6);
   const double quadratic = 0.1;
   const Truth truth = truth_of(lines, quadratic, 0.0);
   const Distortion d = distortion_in(lines, quadratic, 0.0, 1e-4);
@@ -102,7 +102,7 @@ TEST(Distortion, OfASquareIsEvenAtThePredictedLevel) {
 }
 
 TEST(Distortion, OfBothIsDistinguished) {
-  const auto lines = testing::multisine(kHighest, 0.1, 7);
+  const auto lines = tests::multisine(kHighest, 0.1, 7);
   const Truth truth = truth_of(lines, 0.02, 0.3);
   const Distortion d = distortion_in(lines, 0.02, 0.3, 1e-4);
   ASSERT_TRUE(d.odd && d.even);
@@ -111,7 +111,7 @@ TEST(Distortion, OfBothIsDistinguished) {
 }
 
 TEST(Distortion, OfALinearDriveIsNotSignificantAndItsNoiseIsKnown) {
-  const auto lines = testing::multisine(kHighest, 0.1, 8);
+  const auto lines = tests::multisine(kHighest, 0.1, 8);
   const double noise = 0.02;
   const Distortion d = distortion_in(lines, 0.0, 0.0, noise);
   ASSERT_TRUE(d.odd && d.even);
@@ -125,16 +125,15 @@ TEST(Distortion, OfALinearDriveIsNotSignificantAndItsNoiseIsKnown) {
 
 TEST(Distortion, ThatAControllerPutsIntoTheCurrentIsThatOfThePlant) {
   // y = x + 0.3 y^3 with y kept to the multisine: all of the distortion is in the input.
-  const auto lines = testing::multisine(kHighest, 0.1, 5);
+  const auto lines = tests::multisine(kHighest, 0.1, 5);
   const std::size_t n = 6020;
-  data::Experiment e = testing::experiment_of(n, kSample);
-  e[Column::velocity_command] = testing::signal_of(lines, kPeriod, kSample, n);
+  data::Experiment e = tests::experiment_of(n, kSample);
+  e[Column::velocity_command] = tests::signal_of(lines, kPeriod, kSample, n);
   for (const double y : e[Column::velocity_command]) e[Column::current].push_back(y - 0.3 * y * y * y);
   const Period period = *find_period(e).period;
   EXPECT_EQ(period.from, "velocity_command_rad_s");
-  const Distortion d =
-      distortion_of(testing::channel(e[Column::current]), testing::channel(e[Column::velocity_command]), period,
-                    kSample, excited_lines(e, period));
+  const Distortion d = distortion_of(tests::channel(e[Column::current]), tests::channel(e[Column::velocity_command]),
+                                     period, kSample, excited_lines(e, period));
   ASSERT_TRUE(d.odd && d.even);
   EXPECT_TRUE(d.odd->significant);
   EXPECT_NEAR(d.odd->level_db, truth_of(lines, 0.0, -0.3).odd_db, 2.0);
@@ -154,14 +153,14 @@ TEST(Distortion, OfASineIsThatOfItsHarmonics) {
 }
 
 TEST(Distortion, CannotBeDistinguishedWhereEvenLinesAreExcited) {
-  const Distortion d = distortion_in(testing::multisine(kHighest, 0.1, 5, false), 0.1, 0.1, 1e-4);
+  const Distortion d = distortion_in(tests::multisine(kHighest, 0.1, 5, false), 0.1, 0.1, 1e-4);
   EXPECT_EQ(d.excitation, Excitation::kOther);
   EXPECT_FALSE(d.odd || d.even);
   EXPECT_NE(d.odd_why_not.find("even lines"), std::string::npos);
 }
 
 TEST(Distortion, WithoutLeftOutLinesTellsTheEvenOneAlone) {
-  const Distortion d = distortion_in(testing::multisine(kHighest, 0.1, 5, true, false), 0.1, 0.1, 1e-4);
+  const Distortion d = distortion_in(tests::multisine(kHighest, 0.1, 5, true, false), 0.1, 0.1, 1e-4);
   EXPECT_FALSE(d.odd.has_value());
   EXPECT_NE(d.odd_why_not.find("left out"), std::string::npos);
   ASSERT_TRUE(d.even.has_value());
@@ -169,4 +168,4 @@ TEST(Distortion, WithoutLeftOutLinesTellsTheEvenOneAlone) {
 }
 
 }  // namespace
-}  // namespace flexspline::measurement
+}  // namespace flexspline::measurement::measurement_distortion_test

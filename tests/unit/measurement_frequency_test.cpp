@@ -9,12 +9,12 @@
 #include "host/engine/measurement/resonance.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
-namespace flexspline::measurement {
+namespace flexspline::measurement::measurement_frequency_test {
 namespace {
 
 using namespace std::complex_literals;
 using data::Column;
-using testing::kTwoPi;
+using tests::kTwoPi;
 
 constexpr double kSample = 1e-3;
 constexpr double kPeriod = 2.0;
@@ -43,15 +43,15 @@ std::complex<double> integrated(const std::function<std::complex<double>(double)
 // Motor position in steady state, with encoder-like noise.
 data::Dataset record_of(const std::function<std::complex<double>(double)>& velocity_response, std::size_t periods,
                         double noise_rad, double drift_rad_s = 0.0) {
-  const auto lines = testing::multisine(161, 0.05, 11);
+  const auto lines = tests::multisine(161, 0.05, 11);
   data::Dataset dataset;
-  dataset.experiments.push_back(testing::experiment_of(periods * kPeriodSamples + 300, kSample));
+  dataset.experiments.push_back(tests::experiment_of(periods * kPeriodSamples + 300, kSample));
   data::Experiment& e = dataset.experiments.back();
-  e[Column::current] = testing::signal_of(lines, kPeriod, kSample, e.size());
+  e[Column::current] = tests::signal_of(lines, kPeriod, kSample, e.size());
   e[Column::motor_position] =
-      testing::signal_of(lines, kPeriod, kSample, e.size(), [&](double f) { return integrated(velocity_response, f); });
+      tests::signal_of(lines, kPeriod, kSample, e.size(), [&](double f) { return integrated(velocity_response, f); });
   for (std::size_t k = 0; k < e.size(); ++k) e[Column::motor_position][k] += drift_rad_s * e.time_s[k];
-  if (noise_rad > 0.0) testing::add_noise(e[Column::motor_position], noise_rad, 12);
+  if (noise_rad > 0.0) tests::add_noise(e[Column::motor_position], noise_rad, 12);
   return dataset;
 }
 
@@ -77,12 +77,12 @@ TEST(FrequencyResponse, ConfidenceBandHoldsTheTruthNineteenTimesOfTwenty) {
   std::size_t inside = 0, all = 0, trusted = 0;
   double squares = 0.0;
   for (unsigned seed = 1; seed <= 6; ++seed) {
-    const auto lines = testing::multisine(161, 0.05, seed);
+    const auto lines = tests::multisine(161, 0.05, seed);
     const std::size_t samples = 7 * kPeriodSamples + 10;
-    data::Experiment e = testing::experiment_of(samples, kSample);
-    e[Column::current] = testing::signal_of(lines, kPeriod, kSample, samples);
-    e[Column::torque] = testing::signal_of(lines, kPeriod, kSample, samples, locked_drive);
-    testing::add_noise(e[Column::torque], 3.0, 100 + seed);
+    data::Experiment e = tests::experiment_of(samples, kSample);
+    e[Column::current] = tests::signal_of(lines, kPeriod, kSample, samples);
+    e[Column::torque] = tests::signal_of(lines, kPeriod, kSample, samples, locked_drive);
+    tests::add_noise(e[Column::torque], 3.0, 100 + seed);
     data::Dataset dataset;
     dataset.experiments.push_back(std::move(e));
     const Measurement m = measure(dataset);
@@ -115,9 +115,9 @@ TEST(FrequencyResponse, BandHoldsTheDistortionThatRepeatsItself) {
   std::vector<double> bands;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     data::Dataset dataset;
-    dataset.experiments.push_back(testing::experiment_of(3 * kPeriodSamples, kSample));
+    dataset.experiments.push_back(tests::experiment_of(3 * kPeriodSamples, kSample));
     data::Experiment& e = dataset.experiments[0];
-    e[Column::current] = testing::signal_of(testing::multisine(161, 0.1, seed), kPeriod, kSample, e.size());
+    e[Column::current] = tests::signal_of(tests::multisine(161, 0.1, seed), kPeriod, kSample, e.size());
     for (const double x : e[Column::current]) e[Column::torque].push_back(x + cubic * x * x * x);
     const Measurement m = measure(dataset);
     for (const ResponseLine& line : m.records[0].responses.at(0).lines) {
@@ -136,10 +136,10 @@ TEST(FrequencyResponse, BandHoldsTheDistortionThatRepeatsItself) {
 
 TEST(FrequencyResponse, OfUnrelatedSignalsIsNotTrusted) {
   std::vector<double> x(40000, 0.0), y(40000, 0.0);
-  testing::add_noise(x, 1.0, 1);
-  testing::add_noise(y, 1.0, 2);
+  tests::add_noise(x, 1.0, 1);
+  tests::add_noise(y, 1.0, 2);
   const std::vector<data::Segment> segments = {{0, 40000}};
-  const Channel input = testing::channel(std::move(x)), output = testing::channel(std::move(y));
+  const Channel input = tests::channel(std::move(x)), output = tests::channel(std::move(y));
   const auto spectra = spectra_by_welch(input, output, segments, kSample, 2000);
   ASSERT_TRUE(spectra.has_value());
   for (const ResponseLine& line : response_of(*spectra, input, output, kSample)) EXPECT_FALSE(line.trusted);
@@ -149,10 +149,10 @@ TEST(FrequencyResponse, OfADelayHasItsPhaseAndFullCoherence) {
   // White noise, as it is and 3 samples later.
   const std::size_t n = 40000, delay = 3;
   std::vector<double> x(n, 0.0), y(n, 0.0);
-  testing::add_noise(x, 1.0, 1);
+  tests::add_noise(x, 1.0, 1);
   for (std::size_t k = delay; k < n; ++k) y[k] = x[k - delay];
   const std::vector<data::Segment> segments = {{0, n}};
-  const Channel input = testing::channel(std::move(x)), output = testing::channel(std::move(y));
+  const Channel input = tests::channel(std::move(x)), output = tests::channel(std::move(y));
   const auto spectra = spectra_by_welch(input, output, segments, kSample, 2000);
   ASSERT_TRUE(spectra.has_value());
   const auto lines = response_of(*spectra, input, output, kSample);
@@ -169,11 +169,11 @@ TEST(FrequencyResponse, OfAHeldCommandIsThatOfThePlantAlone) {
   // v' = 50 u - 4 v with a current held from sample to sample, solved exactly; the velocity is taken from the position.
   const std::size_t n = 60000;
   data::Dataset dataset;
-  dataset.experiments.push_back(testing::experiment_of(n, kSample));
+  dataset.experiments.push_back(tests::experiment_of(n, kSample));
   data::Experiment& e = dataset.experiments.back();
   e.current_hold = data::CurrentHold::zoh;
   e[Column::current].assign(n, 0.0);
-  testing::add_noise(e[Column::current], 1.0, 5);
+  tests::add_noise(e[Column::current], 1.0, 5);
   e[Column::motor_position].assign(n, 0.0);
   const double a = 4.0, decay = std::exp(-a * kSample), gain = 50.0 / a;
   double v = 0.0, position = 0.0;
@@ -200,11 +200,11 @@ TEST(FrequencyResponse, CountsOnlyWindowsThatHoldALine) {
   // Noise in the first quarter of the record alone, and all along.
   const std::size_t n = 64000;
   std::vector<double> x(n, 0.0), all(n, 0.0);
-  testing::add_noise(all, 1.0, 1);
+  tests::add_noise(all, 1.0, 1);
   std::copy(all.begin(), all.begin() + n / 4, x.begin());
   const std::vector<data::Segment> segments = {{0, n}};
   const auto averages = [&](const std::vector<double>& signal) {
-    const Channel channel = testing::channel(signal);
+    const Channel channel = tests::channel(signal);
     const auto spectra = spectra_by_welch(channel, channel, segments, kSample, 1000);
     double sum = 0.0;
     for (const double a : spectra->averages) sum += a / static_cast<double>(spectra->averages.size());
@@ -215,9 +215,9 @@ TEST(FrequencyResponse, CountsOnlyWindowsThatHoldALine) {
 
 TEST(FrequencyResponse, OfASineSaysNothingBesideItsLine) {
   const std::size_t n = 20000;
-  const std::vector<testing::Line> lines = {{8, 1.0}};
-  const Channel input = testing::channel(testing::signal_of(lines, kPeriod, kSample, n));
-  const Channel output = testing::channel(testing::signal_of(lines, kPeriod, kSample, n, locked_drive));
+  const std::vector<tests::Line> lines = {{8, 1.0}};
+  const Channel input = tests::channel(tests::signal_of(lines, kPeriod, kSample, n));
+  const Channel output = tests::channel(tests::signal_of(lines, kPeriod, kSample, n, locked_drive));
   const std::vector<data::Segment> segments = {{0, n}};
   const auto spectra = spectra_by_welch(input, output, segments, kSample, 4096);
   ASSERT_TRUE(spectra.has_value());
@@ -261,7 +261,7 @@ TEST(Resonance, StatesAnUncertaintyThatItsErrorsKeepTo) {
   const int trials = 12;
   for (int trial = 0; trial < trials; ++trial) {
     data::Dataset dataset = record_of(locked_drive, 6, 0.0);
-    testing::add_noise(dataset.experiments[0][Column::motor_position], 3e-3, 50 + static_cast<unsigned>(trial));
+    tests::add_noise(dataset.experiments[0][Column::motor_position], 3e-3, 50 + static_cast<unsigned>(trial));
     const Measurement m = measure(dataset);
     ASSERT_EQ(m.pooled.at(0).resonances.found.size(), 1u);
     const Resonance& r = m.pooled[0].resonances.found[0];
@@ -285,11 +285,11 @@ TEST(Resonance, IsSeenByWelchWithNoiseAsExcitation) {
   const double w0 = kTwoPi * 12.4, zeta = 0.06, sigma = zeta * w0, wd = std::sqrt(w0 * w0 - sigma * sigma);
   const std::size_t n = 120000;
   data::Dataset dataset;
-  dataset.experiments.push_back(testing::experiment_of(n, kSample));
+  dataset.experiments.push_back(tests::experiment_of(n, kSample));
   data::Experiment& e = dataset.experiments.back();
   e.current_hold = data::CurrentHold::zoh;
   e[Column::current].assign(n, 0.0);
-  testing::add_noise(e[Column::current], 1.0, 5);
+  tests::add_noise(e[Column::current], 1.0, 5);
   e[Column::motor_position].assign(n, 0.0);
   double x = 0.0, v = 0.0;
   const double c = std::cos(wd * kSample), s = std::sin(wd * kSample), decay = std::exp(-sigma * kSample);
@@ -307,4 +307,4 @@ TEST(Resonance, IsSeenByWelchWithNoiseAsExcitation) {
 }
 
 }  // namespace
-}  // namespace flexspline::measurement
+}  // namespace flexspline::measurement::measurement_frequency_test

@@ -8,7 +8,7 @@
 #include "host/engine/measurement/period.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
-namespace flexspline::measurement {
+namespace flexspline::measurement::measurement_noise_test {
 namespace {
 
 using data::Column;
@@ -16,11 +16,11 @@ using data::Column;
 constexpr double kSample = 1e-3;
 
 data::Experiment multisine_record(double period_s, std::size_t samples, double noise) {
-  data::Experiment e = testing::experiment_of(samples, kSample);
-  const auto lines = testing::multisine(41, 0.2, 3);
-  e[Column::current_command] = testing::signal_of(lines, period_s, kSample, samples);
+  data::Experiment e = tests::experiment_of(samples, kSample);
+  const auto lines = tests::multisine(41, 0.2, 3);
+  e[Column::current_command] = tests::signal_of(lines, period_s, kSample, samples);
   e[Column::current] = e[Column::current_command];
-  testing::add_noise(e[Column::current], noise, 4);
+  tests::add_noise(e[Column::current], noise, 4);
   return e;
 }
 
@@ -40,9 +40,9 @@ TEST(Period, IsFoundInTheSetPointAndWithoutIt) {
 }
 
 TEST(Period, IsNotFoundInNoiseAndThenSaysWhy) {
-  data::Experiment e = testing::experiment_of(4000, kSample);
+  data::Experiment e = tests::experiment_of(4000, kSample);
   e[Column::current].assign(4000, 0.0);
-  testing::add_noise(e[Column::current], 1.0, 1);
+  tests::add_noise(e[Column::current], 1.0, 1);
   const PeriodSearch search = find_period(e);
   EXPECT_FALSE(search.period.has_value());
   EXPECT_FALSE(search.why_not.empty());
@@ -57,23 +57,23 @@ TEST(Period, InWhichTheMotionSettlesIsLeftOut) {
   EXPECT_EQ(find_period(e).period->left_out, 1u);
   // Still above the noise in the third of the ten periods.
   for (std::size_t k = 0; k < e.size(); ++k) e[Column::motor_velocity][k] += 50.0 * std::exp(-e.time_s[k] / 0.8);
-  testing::add_noise(e[Column::motor_velocity], 0.02, 6);
+  tests::add_noise(e[Column::motor_velocity], 0.02, 6);
   const PeriodSearch search = find_period(e);
   EXPECT_GE(search.period->left_out, 2u);
   EXPECT_GE(search.period->count, 3u);
   EXPECT_EQ(search.period->left_out + search.period->count, 10u);
-  const NoiseLevel level = noise_by_periods(testing::channel(e[Column::motor_velocity]), *search.period, kSample);
+  const NoiseLevel level = noise_by_periods(tests::channel(e[Column::motor_velocity]), *search.period, kSample);
   EXPECT_NEAR(level.rms, 0.02, 0.002);
 }
 
 TEST(Period, OfAnyLengthHasTheLinesOfItsCosines) {
   // Quick, odd, prime, and twice a prime.
   for (const std::size_t n : {1500u, 1501u, 10007u, 20014u}) {
-    const auto lines = testing::multisine(99, 0.7, 8);
-    const auto found = line_amplitudes(testing::signal_of(lines, static_cast<double>(n) * kSample, kSample, n));
+    const auto lines = tests::multisine(99, 0.7, 8);
+    const auto found = line_amplitudes(tests::signal_of(lines, static_cast<double>(n) * kSample, kSample, n));
     ASSERT_EQ(found.size(), n / 2 + 1);
     std::vector<std::complex<double>> truth(found.size());
-    for (const testing::Line& line : lines) truth[line.line] = line.amplitude;
+    for (const tests::Line& line : lines) truth[line.line] = line.amplitude;
     for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(std::abs(found[k] - truth[k]), 0.0, 1e-9) << k;
   }
 }
@@ -85,7 +85,7 @@ TEST(Period, ExcitedLinesAreThoseOfTheExcitation) {
   for (const data::Experiment& record : {e, blind}) {
     const ExcitedLines excited = excited_lines(record, *find_period(record).period);
     std::vector<std::size_t> truth;
-    for (const testing::Line& line : testing::multisine(41, 0.2, 3)) truth.push_back(line.line);
+    for (const tests::Line& line : tests::multisine(41, 0.2, 3)) truth.push_back(line.line);
     EXPECT_EQ(excited.lines, truth);
   }
   EXPECT_FALSE(excited_lines(blind, *find_period(blind).period).by_set_point);
@@ -100,7 +100,7 @@ TEST(NoiseFloor, IsWhatWasAddedWithinTenPercent) {
     ASSERT_TRUE(search.period.has_value());
     EXPECT_EQ(search.period->is_whole(), period_s == 1.5);
     const NoiseLevel level =
-        noise_by_periods(testing::channel(e[Column::current], "current_a", "A"), *search.period, kSample);
+        noise_by_periods(tests::channel(e[Column::current], "current_a", "A"), *search.period, kSample);
     EXPECT_NEAR(level.rms, noise, 0.1 * noise) << period_s;
     EXPECT_NEAR(level.signal_rms, std::sqrt(17.0 / 2.0) * 0.2, 0.1) << period_s;
   }
@@ -109,7 +109,7 @@ TEST(NoiseFloor, IsWhatWasAddedWithinTenPercent) {
 TEST(NoiseFloor, HasTheSpectrumOfWhiteNoiseAndAddsUpToItsPower) {
   const double noise = 0.02;
   const data::Experiment e = multisine_record(2.0, 40020, noise);
-  const NoiseLevel level = noise_by_periods(testing::channel(e[Column::current]), *find_period(e).period, kSample);
+  const NoiseLevel level = noise_by_periods(tests::channel(e[Column::current]), *find_period(e).period, kSample);
   const double density = noise * noise * 2.0 * kSample;
   double power = 0.0;
   for (const NoiseBand& band : level.bands) {
@@ -126,19 +126,19 @@ TEST(NoiseFloor, DoesNotHoldADriftAndNotWhatRepeats) {
   const std::size_t n = 12020;
   data::Experiment e = multisine_record(1.5, n, noise);
   std::vector<double> signal(n, 0.0);
-  testing::add_noise(signal, noise, 21);
+  tests::add_noise(signal, noise, 21);
   for (std::size_t k = 0; k < n; ++k) {
     signal[k] += 3.0 * e.time_s[k] + (k % 1500 < 750 ? 1.0 : -1.0);  // a drifting axis with dry friction
   }
-  const NoiseLevel level = noise_by_periods(testing::channel(signal), *find_period(e).period, kSample);
+  const NoiseLevel level = noise_by_periods(tests::channel(signal), *find_period(e).period, kSample);
   EXPECT_NEAR(level.rms, noise, 0.1 * noise);
   EXPECT_GT(level.signal_rms, 1.0);
 }
 
 TEST(NoiseFloor, OfARecordAtRestIsThatOfItsSensors) {
-  data::Experiment e = testing::experiment_of(20000, kSample);
+  data::Experiment e = tests::experiment_of(20000, kSample);
   e[Column::current].assign(20000, 0.1);
-  testing::add_noise(e[Column::current], 0.02, 2);
+  tests::add_noise(e[Column::current], 0.02, 2);
   e[Column::motor_position].assign(20000, 1.0);
   ASSERT_TRUE(is_at_rest(e));
   data::Dataset dataset;
@@ -154,7 +154,7 @@ TEST(NoiseFloor, OfARecordAtRestIsThatOfItsSensors) {
 TEST(Measurement, SaysWhatItCannotTellAndWhatToRecord) {
   // A ramp of the velocity under a growing current: neither periodic nor rich.
   data::Dataset dataset;
-  dataset.experiments.push_back(testing::experiment_of(5000, kSample));
+  dataset.experiments.push_back(tests::experiment_of(5000, kSample));
   data::Experiment& e = dataset.experiments[0];
   for (const double t : e.time_s) {
     e[Column::current].push_back(0.1 + 0.05 * t);
@@ -173,7 +173,7 @@ TEST(Measurement, SaysWhatItCannotTellAndWhatToRecord) {
 
 TEST(Measurement, WithoutAnEffortSaysWhichColumnIsMissing) {
   data::Dataset dataset;
-  dataset.experiments.push_back(testing::experiment_of(5000, kSample));
+  dataset.experiments.push_back(tests::experiment_of(5000, kSample));
   data::Experiment& e = dataset.experiments[0];
   for (const double t : e.time_s) e[Column::motor_position].push_back(std::sin(t));
   const Measurement m = measure(dataset);
@@ -182,4 +182,4 @@ TEST(Measurement, WithoutAnEffortSaysWhichColumnIsMissing) {
 }
 
 }  // namespace
-}  // namespace flexspline::measurement
+}  // namespace flexspline::measurement::measurement_noise_test

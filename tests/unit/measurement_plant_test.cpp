@@ -11,7 +11,7 @@
 #include "host/engine/measurement/measure.hpp"
 #include "tests/unit/measurement_signals.hpp"
 
-namespace flexspline::measurement {
+namespace flexspline::measurement::measurement_plant_test {
 namespace {
 
 using data::Column;
@@ -53,32 +53,32 @@ std::vector<std::pair<double, double>> poles(const plant::Physics& p, bool outpu
   std::vector<std::pair<double, double>> found;
   const Eigen::Vector4cd eigenvalues = a.eigenvalues();
   for (const std::complex<double> pole : eigenvalues)
-    if (pole.imag() > 1e-6) found.emplace_back(std::abs(pole) / testing::kTwoPi, -pole.real() / std::abs(pole));
+    if (pole.imag() > 1e-6) found.emplace_back(std::abs(pole) / tests::kTwoPi, -pole.real() / std::abs(pole));
   return found;
 }
 
 // A multisine of the current about a mean, held from sample to sample, and what the sensors read of it.
 data::Dataset record(const plant::Physics& physics, bool locked, double amplitude_a, double mean_a, unsigned seed) {
-  const auto lines = testing::multisine(121, amplitude_a, seed);
+  const auto lines = tests::multisine(121, amplitude_a, seed);
   const std::size_t samples = 7 * kPeriodSamples;
   data::Dataset dataset;
   dataset.drive.gear_ratio = physics.gear_ratio;
-  data::Experiment e = testing::experiment_of(samples, kSample);
+  data::Experiment e = tests::experiment_of(samples, kSample);
   e.load = locked ? data::Load::locked : data::Load::free;
   e.current_hold = data::CurrentHold::zoh;
   e.encoder_counts = kCounts;
-  e[Column::current_command] = testing::signal_of(lines, kPeriodSamples * kSample, kSample, samples);
+  e[Column::current_command] = tests::signal_of(lines, kPeriodSamples * kSample, kSample, samples);
   for (double& i : e[Column::current_command]) i += mean_a;
   e[Column::current] = e[Column::current_command];
-  testing::add_noise(e[Column::current], 2e-3, seed + 1);
+  tests::add_noise(e[Column::current], 2e-3, seed + 1);
   plant::TwoMass drive(physics, locked);
   for (const double current : e[Column::current_command]) {
-    const double quantum = testing::kTwoPi / kCounts;
+    const double quantum = tests::kTwoPi / kCounts;
     e[Column::motor_position].push_back(quantum * std::round(drive.state().motor_angle / quantum));
     e[Column::torque].push_back(drive.torque());
     drive.advance({current, 30.0, 0.0}, kSample, 16);
   }
-  testing::add_noise(e[Column::torque], 0.01, seed + 2);
+  tests::add_noise(e[Column::torque], 0.01, seed + 2);
   dataset.experiments.push_back(std::move(e));
   return dataset;
 }
@@ -160,13 +160,13 @@ TEST(MeasuredPlant, WithACubicSpringHasOddDistortionOfTheTorsion) {
 TEST(MeasuredPlant, ShowsItsPolesUnderAVelocityControllerThatKeepsItFromSticking) {
   plant::Physics physics = linear_drive();
   physics.friction.coulomb = 0.008;
-  const auto lines = testing::multisine(121, 0.4, 36);
+  const auto lines = tests::multisine(121, 0.4, 36);
   const std::size_t samples = 7 * kPeriodSamples;
   data::Dataset dataset;
-  data::Experiment e = testing::experiment_of(samples, kSample);
+  data::Experiment e = tests::experiment_of(samples, kSample);
   e.current_hold = data::CurrentHold::zoh;
   e.encoder_counts = kCounts;
-  e[Column::velocity_command] = testing::signal_of(lines, kPeriodSamples * kSample, kSample, samples);
+  e[Column::velocity_command] = tests::signal_of(lines, kPeriodSamples * kSample, kSample, samples);
   plant::TwoMass drive(physics, false);
   std::mt19937 random(37);
   std::normal_distribution<double> noise(0.0, 0.05);
@@ -175,7 +175,7 @@ TEST(MeasuredPlant, ShowsItsPolesUnderAVelocityControllerThatKeepsItFromSticking
     command += 30.0;
     const double error = command - drive.state().motor_velocity + noise(random);
     integral += 1.0 * error * kSample;
-    const double current = 0.02 * error + integral, quantum = testing::kTwoPi / kCounts;
+    const double current = 0.02 * error + integral, quantum = tests::kTwoPi / kCounts;
     e[Column::current].push_back(current);
     e[Column::motor_position].push_back(quantum * std::round(drive.state().motor_angle / quantum));
     drive.advance({current, 30.0, 0.0}, kSample, 16);
@@ -195,4 +195,4 @@ TEST(MeasuredPlant, ShowsItsPolesUnderAVelocityControllerThatKeepsItFromSticking
 }
 
 }  // namespace
-}  // namespace flexspline::measurement
+}  // namespace flexspline::measurement::measurement_plant_test

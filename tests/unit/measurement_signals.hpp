@@ -11,7 +11,7 @@
 #include "host/engine/measurement/channels.hpp"
 #include "host/input/data/dataset.hpp"
 
-namespace flexspline::measurement::testing {
+namespace flexspline::measurement::tests {
 
 inline constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
@@ -84,4 +84,4 @@ inline Channel channel(std::vector<double> values, const char* name = "x", const
   return c;
 }
 
-}  // namespace flexspline::measurement::testing
+}  // namespace flexspline::measurement::tests

@@ -10,7 +10,7 @@
 #include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ TEST_F(ModelFiles, ErrorsOfReadingNameThePath) {
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_files_test

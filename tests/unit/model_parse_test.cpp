@@ -6,7 +6,7 @@
 #include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_parse_test {
 namespace {
 
 const std::string kHead = "format = \"flexspline-model/1\"\n";  // line 1
@@ -245,4 +245,4 @@ TEST(ModelParse, NamesTheLineOfEveryMistakeElsewhere) {
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_parse_test

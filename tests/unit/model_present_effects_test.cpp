@@ -14,7 +14,7 @@
 #include "shared/control/feedforward.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::model_present_effects_test {
 namespace {
 
 using effects::Inputs;
@@ -198,4 +198,4 @@ TEST(RippleOfTheTorqueSensor, IsTakenOutOfWhatTheDriveTellsAtEverySpeed) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::model_present_effects_test

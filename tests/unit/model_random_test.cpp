@@ -9,7 +9,7 @@
 #include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_random_test {
 namespace {
 
 const std::string kHead = "format = \"flexspline-model/1\"\n";
@@ -159,4 +159,4 @@ TEST(ModelWrite, AnyModelComesBackFromItsOwnNewFile) {
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_random_test

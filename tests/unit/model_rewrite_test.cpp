@@ -9,7 +9,7 @@
 #include "host/physics/model/model.hpp"
 #include "tests/unit/model_some_effects.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_rewrite_test {
 namespace {
 
 const std::string kHead = "format = \"flexspline-model/1\"\n";
@@ -355,4 +355,4 @@ rmse_after = 0.0041
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_rewrite_test

@@ -11,7 +11,7 @@
 
 #include "host/physics/model/units.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_text_test {
 namespace {
 
 TEST(ModelText, NumbersAreShort) {
@@ -70,4 +70,4 @@ TEST(ModelText, UnitsAreTheSameWhereTheyMeanTheSame) {
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_text_test

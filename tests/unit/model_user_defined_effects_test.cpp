@@ -7,7 +7,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/model/model.hpp"
 
-namespace flexspline::model {
+namespace flexspline::model::model_user_defined_effects_test {
 namespace {
 
 constexpr const char* kTable = R"toml(format = "flexspline-model/1"
@@ -172,4 +172,4 @@ TEST(ModelFileOfMadeEffects, NewFilesHoldThem) {
 }
 
 }  // namespace
-}  // namespace flexspline::model
+}  // namespace flexspline::model::model_user_defined_effects_test

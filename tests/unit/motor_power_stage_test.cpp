@@ -5,15 +5,13 @@
 
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "hil/motor/shunts.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::motor {
+namespace flexspline::motor::motor_power_stage_test {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 TEST(Motor, CurrentRisesAsAnExponentialOfItsWindingAtStandstill) {
   MotorParameters p;
@@ -155,4 +153,4 @@ TEST(Shunts, ALowSideThatIsOnForTooShortShowsTooLittle) {
 }
 
 }  // namespace
-}  // namespace flexspline::motor
+}  // namespace flexspline::motor::motor_power_stage_test

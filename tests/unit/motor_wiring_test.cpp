@@ -8,7 +8,7 @@
 #include "hil/motor/power_stage.hpp"
 #include "hil/motor/shaft.hpp"
 
-namespace flexspline::motor {
+namespace flexspline::motor::motor_wiring_test {
 namespace {
 
 Sample after(PowerStage& stage, const Triple& duties, double speed, int periods) {
@@ -113,4 +113,4 @@ TEST(MotorShaft, AnEncoderShowsItInSteps) {
 }
 
 }  // namespace
-}  // namespace flexspline::motor
+}  // namespace flexspline::motor::motor_wiring_test

@@ -11,7 +11,7 @@
 #include "shared/observers/disturbance.hpp"
 #include "shared/observers/encoder_angle.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::observers_disturbance_test {
 namespace {
 
 using fixed::Checked;
@@ -135,4 +135,4 @@ TEST(DisturbanceObserver, OnADriveAgreesWithDoubleOverItsEnvelopeAndStaysWithinI
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::observers_disturbance_test

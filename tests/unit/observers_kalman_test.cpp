@@ -8,16 +8,16 @@
 #include <cmath>
 #include <complex>
 #include <cstdint>
-#include <numbers>
 #include <random>
 #include <vector>
 
 #include "host/common/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/observers/encoder_kalman.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::observers_kalman_test {
 namespace {
 
 using fixed::Checked;
@@ -27,7 +27,6 @@ using numbers::Real;
 using observers::EncoderKalman;
 using observers::KalmanGains;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kCounts = 4096.0;
 constexpr double kTickS = 1.0 / 16000.0;
 
@@ -310,4 +309,4 @@ TEST(EncoderKalman, DoesNotSeeTheWrapOfTheAngle) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::observers_kalman_test

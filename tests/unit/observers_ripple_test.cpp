@@ -4,16 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 
 #include "host/common/numbers/real.hpp"
 #include "shared/fixed/checked.hpp"
 #include "shared/fixed/intervals.hpp"
 #include "shared/fixed/overflow_log.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/observers/ripple_filter.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::observers_ripple_test {
 namespace {
 
 using fixed::Checked;
@@ -23,7 +23,6 @@ using fixed::OverflowLog;
 using numbers::Real;
 using observers::RippleFilter;
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kTickS = 1.0 / 16000.0;
 constexpr double kRipple = 0.05;  // of the torque base
 constexpr double kPhase = 0.7;
@@ -235,4 +234,4 @@ TEST(RippleFilter, ARippleLargerThanStatedIsTakenOutUpToWhatIsStated) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::observers_ripple_test

@@ -13,7 +13,7 @@
 #include "shared/fixed/checked.hpp"
 #include "shared/observers/torsion.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::observers_torsion_test {
 namespace {
 
 using fixed::Checked;
@@ -193,4 +193,4 @@ TEST(TorsionObserver, RefusesATickThatIsTooLongForTheResonance) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::observers_torsion_test

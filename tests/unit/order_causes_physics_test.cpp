@@ -9,12 +9,11 @@
 #include <numbers>
 #include <vector>
 
+#include "shared/fixed/turn.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline {
+namespace flexspline::order_causes_physics_test {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 // Amplitudes of the orders of one turn that is sampled evenly.
 std::vector<double> amplitudes(const std::vector<double>& turn, int highest) {
@@ -254,4 +253,4 @@ TEST(OrdersOnTheTwin, HarmonicsOfTheBackEmfRippleWithSixTimesThePolePairsInPropo
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::order_causes_physics_test

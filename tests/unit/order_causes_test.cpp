@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace flexspline::catalogue {
+namespace flexspline::catalogue::order_causes_test {
 namespace {
 
 model::Drive drive_of(double gear_ratio, double pole_pairs = 0.0, double slots = 0.0) {
@@ -215,4 +215,4 @@ TEST(OrderCauses, EveryCauseHasACheckACureAndAReference) {
 }
 
 }  // namespace
-}  // namespace flexspline::catalogue
+}  // namespace flexspline::catalogue::order_causes_test

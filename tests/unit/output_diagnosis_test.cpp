@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-namespace flexspline::output {
+namespace flexspline::output::output_diagnosis_test {
 namespace {
 
 selection::Diagnosis with_possible_effects() {
@@ -73,4 +73,4 @@ TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {
 }
 
 }  // namespace
-}  // namespace flexspline::output
+}  // namespace flexspline::output::output_diagnosis_test

@@ -9,13 +9,13 @@
 
 #include "tests/support/pairing_host.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::pairing_memory_test {
 namespace {
 
 using storage::PairingError;
 using Key = PairingStore::Key;
-using testing::CutAt;
-using testing::PowerCut;
+using tests::CutAt;
+using tests::PowerCut;
 
 Key key_of(std::uint8_t n) {
   Key key{};
@@ -131,4 +131,4 @@ TEST(PairingMemory, APowerCutLosesNothingButTheOperationThatWasCutAndNoNumberCom
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::pairing_memory_test

@@ -15,7 +15,7 @@
 #include "tests/same_bits/adversarial.hpp"
 #include "tests/same_bits/drive_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::parameter_block_golden_test {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -182,4 +182,4 @@ TEST(Fields, AWrongFieldIsNamedByItsPlaceAndAShortOrLongEntryByItsLength) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::parameter_block_golden_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/pairing_host.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::parameter_lock_test {
 namespace {
 
 using protocol::Code;
@@ -160,4 +160,4 @@ TEST(ParameterLock, GivesNoChallengeWhereItsNumberCannotBeRecorded) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::parameter_lock_test

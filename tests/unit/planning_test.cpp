@@ -11,7 +11,7 @@
 #include "host/engine/planning/design.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
-namespace flexspline::planning {
+namespace flexspline::planning::planning_test {
 namespace {
 
 Plan a_plan() {
@@ -186,4 +186,4 @@ TEST(Planning, ACurrentThatMovesNothingTellsNothing) {
 }
 
 }  // namespace
-}  // namespace flexspline::planning
+}  // namespace flexspline::planning::planning_test

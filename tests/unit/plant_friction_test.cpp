@@ -9,7 +9,7 @@
 #include "hil/plant/friction.hpp"
 #include "tests/unit/effects_record.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::plant_friction_test {
 namespace {
 
 using plant::FrictionPoint;
@@ -172,4 +172,4 @@ TEST(PlantFriction, LossIsThatOfTheEffectAlongAPathWithReversals) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::plant_friction_test

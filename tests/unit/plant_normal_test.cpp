@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-namespace flexspline::plant {
+namespace flexspline::plant::plant_normal_test {
 namespace {
 
 // One number at a time, as the method is told, from the standard library's words.
@@ -72,4 +72,4 @@ TEST(PlantNormal, NumbersHaveTheMomentsOfAStandardNormalDistribution) {
 }
 
 }  // namespace
-}  // namespace flexspline::plant
+}  // namespace flexspline::plant::plant_normal_test

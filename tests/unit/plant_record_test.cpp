@@ -14,7 +14,7 @@
 #include "hil/plant/physics.hpp"
 #include "hil/plant/recorder.hpp"
 
-namespace flexspline::plant {
+namespace flexspline::plant::plant_record_test {
 namespace {
 
 double rms(const std::vector<double>& x) {
@@ -254,4 +254,4 @@ TEST(Dataset, FilesHoldWhatTheContractPromises) {
 }
 
 }  // namespace
-}  // namespace flexspline::plant
+}  // namespace flexspline::plant::plant_record_test

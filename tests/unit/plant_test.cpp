@@ -8,7 +8,7 @@
 #include "hil/plant/physics.hpp"
 #include "hil/plant/two_mass.hpp"
 
-namespace flexspline::plant {
+namespace flexspline::plant::plant_test {
 namespace {
 
 constexpr double kSample = 1e-3;
@@ -305,4 +305,4 @@ TEST(Plant, ADriveThatBendsNowhereMovesAsOneThatIsSolvedByIteration) {
 }
 
 }  // namespace
-}  // namespace flexspline::plant
+}  // namespace flexspline::plant::plant_test

@@ -8,7 +8,7 @@
 #include "tests/support/service_host.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::position_reference_test {
 namespace {
 
 using control::SensorKind;
@@ -208,4 +208,4 @@ TEST(PositionReference, AHostOfATwinHearsOfItAndHomesAShaftThatStands) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::position_reference_test

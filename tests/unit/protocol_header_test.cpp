@@ -14,7 +14,7 @@
 #include "shared/model/block.hpp"
 #include "shared/protocol/payloads.hpp"
 
-namespace flexspline::interchange {
+namespace flexspline::interchange::protocol_header_test {
 namespace {
 
 const std::map<std::string, std::uint64_t>& numbers() {
@@ -142,4 +142,4 @@ TEST(Signature, IsTheLastLineAndReplacesAnOlderOne) {
 }
 
 }  // namespace
-}  // namespace flexspline::interchange
+}  // namespace flexspline::interchange::protocol_header_test

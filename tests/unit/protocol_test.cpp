@@ -14,7 +14,7 @@
 #include "shared/protocol/serial_frame.hpp"
 #include "shared/protocol/texts.hpp"
 
-namespace flexspline::protocol {
+namespace flexspline::protocol::protocol_test {
 namespace {
 
 template <class E>
@@ -471,4 +471,4 @@ TEST(TelemetryFrames, ComeOutOneByOneAndAWrongCountIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::protocol
+}  // namespace flexspline::protocol::protocol_test

@@ -9,14 +9,14 @@
 #include "tests/support/limit_trial.hpp"
 #include "tests/support/two_ampere_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::reachable_limits_test {
 namespace {
 
 using firmware::BlockFinding;
 
 // A drive of 2 A and 200 rad/s with these settings: what pack says, or "taken".
 std::string packed(const std::string& tables) {
-  const model::Model m = testing::two_ampere_drive();
+  const model::Model m = tests::two_ampere_drive();
   const auto d = deployment::bases_of(m, 1.0 / kTickHz);
   const std::string all = "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 16384\n" + tables;
   try {
@@ -97,4 +97,4 @@ TEST(ReachableLimits, EveryLimitOfADrawnBlockThatTheDriveTakesActs) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::reachable_limits_test

@@ -11,7 +11,7 @@
 #include "hil/thesis_figures/figures.hpp"
 #include "hil/thesis_figures/twin_runs.hpp"
 
-namespace flexspline::thesis_figures {
+namespace flexspline::thesis_figures::report_figures_test {
 namespace {
 
 constexpr std::uint64_t kSeed = 7001;
@@ -98,4 +98,4 @@ TEST(FigureFiles, ASvgHasEachCurveAndEscapesItsTexts) {
 }
 
 }  // namespace
-}  // namespace flexspline::thesis_figures
+}  // namespace flexspline::thesis_figures::report_figures_test

@@ -12,6 +12,7 @@
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/runge_kutta.hpp"
 
+namespace flexspline::report_friction_blocks_test {
 namespace {
 
 using namespace flexspline::report;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -315,3 +316,4 @@ TEST(ReportFriction, VariableStepsMeetTheirToleranceWhereNothingJumps) {
 }
 
 }  // namespace
+}  // namespace flexspline::report_friction_blocks_test

@@ -11,6 +11,7 @@
 #include "hil/thesis_models/harmonic_drive.hpp"
 #include "hil/thesis_models/published.hpp"
 
+namespace flexspline::report_models_test {
 namespace {
 
 using namespace flexspline::report;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -206,3 +207,4 @@ TEST(ReportModel3, AHysteresisLoopEnclosesTheEnergyThatTheDampingTakes) {
 }
 
 }  // namespace
+}  // namespace flexspline::report_models_test

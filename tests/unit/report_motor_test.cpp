@@ -10,6 +10,7 @@
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/runge_kutta.hpp"
 
+namespace flexspline::report_motor_test {
 namespace {
 
 using namespace flexspline::report;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -148,3 +149,4 @@ TEST(ReportMotor, CoulombAndViscousFrictionStopItAfterALogarithmicTime) {
 }
 
 }  // namespace
+}  // namespace flexspline::report_motor_test

@@ -13,7 +13,7 @@
 #include "host/output/report/trace.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::report {
+namespace flexspline::report::report_page_test {
 namespace {
 
 using nlohmann::json;
@@ -351,4 +351,4 @@ TEST(Packed, ComesBackWithinOneCode) {
 }
 
 }  // namespace
-}  // namespace flexspline::report
+}  // namespace flexspline::report::report_page_test

@@ -10,6 +10,7 @@
 #include "hil/thesis_models/published.hpp"
 #include "hil/thesis_models/runge_kutta.hpp"
 
+namespace flexspline::report_systems_test {
 namespace {
 
 using namespace flexspline::report;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -249,3 +250,4 @@ TEST(ReportSystems, TheBoundaryLayerLetsALockedSpringUnwindThatFrictionWouldHold
 }
 
 }  // namespace
+}  // namespace flexspline::report_systems_test

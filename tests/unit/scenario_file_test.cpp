@@ -7,7 +7,7 @@
 
 #include "hil/scenario/scenario_file.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::scenario_file_test {
 namespace {
 
 using scenario::find_scenario;
@@ -143,4 +143,4 @@ TEST(Scenarios, ALoadBeyondTheDrivesTorqueIsAFollowingErrorAndABlowIsNone) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::scenario_file_test

@@ -5,7 +5,7 @@
 #include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/policy.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_contradicted_test {
 namespace {
 
 // A balance whose left-out error is 1, and a candidate that makes it `error`.
@@ -51,4 +51,4 @@ TEST(Contradicted, PreslidingIsNotJudgedAsLikelihoodLeavesOutReversals) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_contradicted_test

@@ -9,7 +9,7 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/candidate_models.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_edits_test {
 namespace {
 
 using data::Column;
@@ -269,4 +269,4 @@ TEST_F(Edit, RefusesToRemoveWhatAnotherEffectScales) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_edits_test

@@ -5,16 +5,16 @@
 #include <random>
 
 #include "host/engine/selection/confounding.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/ripple_candidate.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_effect_size_test {
 namespace {
 
 using data::Column;
 using estimation::Balance;
 
-constexpr double kTurn = 6.283185307179586;
 constexpr double kAmplitude_nm = 0.02;
 
 // Inertia, viscous and Coulomb friction and a ripple of three a turn over many turns.
@@ -42,7 +42,7 @@ Candidate named_ripple(const model::Drive& drive) {
   const data::Experiment e = rippled_experiment();
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, {20.0, true});
   RegressionProblem data(prepared, Balance::motor);
-  const Terms terms = estimation::terms_of(testing::plain_model());
+  const Terms terms = estimation::terms_of(tests::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
   Diagnosis result;
@@ -50,12 +50,12 @@ Candidate named_ripple(const model::Drive& drive) {
   result.candidates.resize(1);
   result.candidates.front().effect = "torque_ripple";
   result.candidates.front().order = 3.0;
-  explain_named(search, {testing::ripple_candidate(search, 3.0, keep)}, drive, result);
+  explain_named(search, {tests::ripple_candidate(search, 3.0, keep)}, drive, result);
   return result.candidates.front();
 }
 
 TEST(EffectSize, OfARippleIsItsAmplitudeAtThePeakAndItsRmsInPercentOfTheRatedTorqueAtTheMotor) {
-  model::Drive drive = testing::plain_model().drive;
+  model::Drive drive = tests::plain_model().drive;
   drive.gear_ratio.value = 50.0;
   drive.rated_torque_nm.value = 10.0;
   const Candidate c = named_ripple(drive);
@@ -68,7 +68,7 @@ TEST(EffectSize, OfARippleIsItsAmplitudeAtThePeakAndItsRmsInPercentOfTheRatedTor
 }
 
 TEST(EffectSize, HasNoPercentageWhereTheModelStatesNoRatedTorque) {
-  model::Drive drive = testing::plain_model().drive;
+  model::Drive drive = tests::plain_model().drive;
   drive.rated_torque_nm.value.reset();
   const Candidate c = named_ripple(drive);
   ASSERT_TRUE(c.size.has_value());
@@ -76,4 +76,4 @@ TEST(EffectSize, HasNoPercentageWhereTheModelStatesNoRatedTorque) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_effect_size_test

@@ -7,7 +7,7 @@
 #include "host/engine/selection/filtered_table.hpp"
 #include "host/engine/selection/setting.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_filtered_table_test {
 namespace {
 
 constexpr double kRowS = 1e-3;
@@ -97,4 +97,4 @@ TEST(FilteredTable, TheMaskLeavesOutReversalsAndAlwaysRest) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_filtered_table_test

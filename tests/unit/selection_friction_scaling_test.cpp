@@ -3,7 +3,7 @@
 
 #include "host/engine/selection/friction_scaling.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_friction_scaling_test {
 namespace {
 
 TEST(FrictionScaling, StaysWhereFrictionOfTheRecordsGoesWithIt) {
@@ -22,4 +22,4 @@ TEST(FrictionScaling, OfFewerRecordsThanTheTestNeedsHeldOutExperimentsDecide) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_friction_scaling_test

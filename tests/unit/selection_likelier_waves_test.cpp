@@ -3,7 +3,7 @@
 
 #include "host/engine/selection/named_by_resampling.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_likelier_waves_test {
 namespace {
 
 CandidateFit candidate(std::string_view effect, double order, double score) {
@@ -72,4 +72,4 @@ TEST(IdenticalEffects, AreNotThoseThatAreOnlyAboutAsLikely) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_likelier_waves_test

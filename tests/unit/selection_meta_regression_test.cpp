@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_meta_regression_test {
 namespace {
 
 using Eigen::Index;
@@ -266,4 +266,4 @@ TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_meta_regression_test

@@ -11,7 +11,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/two_sines.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_one_sided_data_test {
 namespace {
 
 using estimation::Balance;
@@ -21,9 +21,9 @@ const estimation::PipelineOptions kOptions{20.0, true};
 // Which of the two amplitudes of Stribeck friction and its velocity are known, after the missing direction was left
 // out.
 std::vector<std::uint8_t> known_on(double amplitude_rad, double drift_rad_s) {
-  const data::Experiment e = testing::two_sines(amplitude_rad, drift_rad_s, [](double, double) { return 0.0; });
+  const data::Experiment e = tests::two_sines(amplitude_rad, drift_rad_s, [](double, double) { return 0.0; });
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
-  Terms terms = extend(estimation::terms_of(testing::plain_model()), catalogue::get("stribeck_gaussian"), std::nullopt);
+  Terms terms = extend(estimation::terms_of(tests::plain_model()), catalogue::get("stribeck_gaussian"), std::nullopt);
   leave_out_unseen_direction(RegressionProblem(prepared, Balance::motor), terms);
   for (std::size_t p = 0; p < 2; ++p) EXPECT_TRUE(terms.back().known[p] == 0 || terms.back().values[p] == 0.0);
   return terms.back().known;
@@ -37,10 +37,10 @@ TEST(UnseenDirection, LeavesOutTheAmplitudeThatNoSampleShows) {
 
 // Whether an offset and gravity are one group on such a record.
 bool are_confounded(double amplitude_rad, const std::function<double(double)>& more) {
-  const data::Experiment e = testing::two_sines(amplitude_rad, 0.0, [&](double, double q) { return more(q); });
+  const data::Experiment e = tests::two_sines(amplitude_rad, 0.0, [&](double, double q) { return more(q); });
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   RegressionProblem data(prepared, Balance::motor);
-  const Terms terms = estimation::terms_of(testing::plain_model());
+  const Terms terms = estimation::terms_of(tests::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
   const std::vector<CandidateFit> candidates = rank_candidates(search);
@@ -62,4 +62,4 @@ TEST(OffsetAndGravity, AreDistinguishedOverALongTravel) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_one_sided_data_test

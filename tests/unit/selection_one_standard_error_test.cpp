@@ -5,7 +5,7 @@
 
 #include "host/engine/selection/cross_validation.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_one_standard_error_test {
 namespace {
 
 // A record of as many samples as squares, so that its noise is 1.
@@ -48,4 +48,4 @@ TEST(OneStandardError, LeavesOutPartsWithoutSamples) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_one_standard_error_test

@@ -5,7 +5,7 @@
 #include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/policy.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_output_angle_test {
 namespace {
 
 // A balance with one candidate of that score, and no known floor.
@@ -46,4 +46,4 @@ TEST(OutputAngle, OtherEffectsAreStatedByTheirFrequencyAlone) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_output_angle_test

@@ -9,7 +9,7 @@
 #include "host/engine/selection/filtered_table.hpp"
 #include "host/engine/selection/halves.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_presliding_columns_test {
 namespace {
 
 // Columns of a table: two of the model, one that differs with the state of presliding, and two of its shape.
@@ -120,4 +120,4 @@ TEST(PreslidingColumns, OfTheShapeHaveNoNegativeForces) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_presliding_columns_test

@@ -9,25 +9,25 @@
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/candidate_tables.hpp"
 #include "host/engine/selection/presliding.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/swinging_axis.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_presliding_test {
 namespace {
 
 using data::Column;
 using estimation::Balance;
 
-constexpr double kTurn = 6.283185307179586;
-constexpr double kTravel_rad = 0.2, kDry_nm = testing::kSwingingDry_nm, kNoise_nm = testing::kSwingingNoise_nm;
+constexpr double kTravel_rad = 0.2, kDry_nm = tests::kSwingingDry_nm, kNoise_nm = tests::kSwingingNoise_nm;
 
 data::Dataset swinging() {
-  return testing::swinging_axis(kTravel_rad);
+  return tests::swinging_axis(kTravel_rad);
 }
 
 TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToTheNoise) {
   const data::Dataset dataset = swinging();
-  const Addition added = add(dataset, testing::plain_model(), "dahl_friction", {});
+  const Addition added = add(dataset, tests::plain_model(), "dahl_friction", {});
   EXPECT_GT(added.before.rmse_fit, 10.0 * added.after.rmse_fit);
   EXPECT_LT(added.after.rmse_fit, 1.5 * kNoise_nm);
   ASSERT_FALSE(added.warnings.empty());
@@ -43,7 +43,7 @@ TEST(PreslidingLaw, ThatIsAddedIsFittedAroundReversalsAndTakesTheErrorThereToThe
 }
 
 TEST(PreslidingLaw, ThatIsAddedWithoutAMaskHasNoNoteOnReversalsAsAllModelsAreJudgedThere) {
-  const Addition added = add(swinging(), testing::plain_model(), "dahl_friction", {std::nullopt, false});
+  const Addition added = add(swinging(), tests::plain_model(), "dahl_friction", {std::nullopt, false});
   EXPECT_GT(added.before.rmse_fit, 10.0 * added.after.rmse_fit);
   for (const std::string& warning : added.warnings)
     EXPECT_EQ(warning.find("around reversals of the motor"), std::string::npos) << warning;
@@ -52,7 +52,7 @@ TEST(PreslidingLaw, ThatIsAddedWithoutAMaskHasNoNoteOnReversalsAsAllModelsAreJud
 TEST(PreslidingLaw, KeepsTheSamplesAroundReversalsOfTheMotorThatAModelOfVelocityAloneMasks) {
   const data::Dataset dataset = swinging();
   const std::vector<const data::Experiment*> all = {&dataset.experiments[0], &dataset.experiments[1]};
-  model::Model with = testing::plain_model();
+  model::Model with = tests::plain_model();
   for (model::Effect& effect : with.effects)
     if (effect.type == "coulomb_friction") effect = catalogue::blank_effect(catalogue::get("dahl_friction"), {});
   const auto masked = [&](const model::Model& model) {
@@ -61,7 +61,7 @@ TEST(PreslidingLaw, KeepsTheSamplesAroundReversalsOfTheMotorThatAModelOfVelocity
     for (const estimation::Record& r : prepared.records) sum += r.rows[estimation::index(Balance::motor)].masked;
     return sum;
   };
-  EXPECT_GT(masked(testing::plain_model()), 0u);
+  EXPECT_GT(masked(tests::plain_model()), 0u);
   EXPECT_EQ(masked(with), 0u);
 }
 
@@ -72,7 +72,7 @@ TEST(PreslidingLaw, IsSearchedUpToAQuarterOfTheUsualStrokeThoughNoiseMakesManyTi
   for (data::Experiment& e : dataset.experiments)
     for (double& q : e[Column::motor_position]) q += noise(random);
   const estimation::PreparedData prepared =
-      estimation::prepare({&dataset.experiments[0], &dataset.experiments[1]}, testing::plain_model(), {});
+      estimation::prepare({&dataset.experiments[0], &dataset.experiments[1]}, tests::plain_model(), {});
   const std::vector<double> travels = presliding_travels(prepared, kPolicy);
   ASSERT_FALSE(travels.empty());
   EXPECT_LT(travels.front(), 0.5 * kTravel_rad);
@@ -88,8 +88,8 @@ data::Dataset sticking() {
   data::Dataset dataset;
   for (const double frequency_hz : {0.21, 0.34}) {
     const double rate = kTurn * frequency_hz, half_s = 0.5 / frequency_hz;
-    dataset.experiments.push_back(testing::written_experiment(
-        frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
+    dataset.experiments.push_back(
+        tests::written_experiment(frequency_hz < 0.3 ? "slow" : "fast", 2e-3, 6000, [&](double t, data::Experiment& e) {
           const double strokes = std::floor(t / (half_s + kStuck_s)), within = t - strokes * (half_s + kStuck_s);
           const double way = std::fmod(strokes, 2.0) == 0.0 ? 1.0 : -1.0, angle = rate * std::min(within, half_s);
           const double q = -3.0 * way * std::cos(angle), w = 3.0 * way * rate * std::sin(angle);
@@ -105,7 +105,7 @@ data::Dataset sticking() {
 using Experiments = std::vector<const data::Experiment*>;
 
 bool resolves_presliding(const data::Dataset& dataset) {
-  const auto fitted = estimation::identify(dataset, testing::plain_model(), {});
+  const auto fitted = estimation::identify(dataset, tests::plain_model(), {});
   const Experiments all = {&dataset.experiments[0], &dataset.experiments[1]};
   return make_tables(all, fitted->model.drive, fitted->terms, Balance::motor, kPolicy).presliding_is_resolved;
 }
@@ -116,4 +116,4 @@ TEST(PreslidingLaw, HasATravelThatIsResolvedWhereItIsThereAndNoneWhereTheAxisOnl
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_presliding_test

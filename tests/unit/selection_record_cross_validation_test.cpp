@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_record_cross_validation_test {
 namespace {
 
 TEST(RecordCrossValidation, IsCertainFromFourRecordsOfFourOn) {
@@ -27,4 +27,4 @@ TEST(RecordCrossValidation, IsRefutedBelowThreeRecordsOfFive) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_record_cross_validation_test

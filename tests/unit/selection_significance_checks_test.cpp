@@ -11,7 +11,7 @@
 #include "tests/support/ripple_candidate.hpp"
 #include "tests/support/two_sines.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_significance_checks_test {
 namespace {
 
 using estimation::Balance;
@@ -27,10 +27,10 @@ double ripple(double, double q) {
 CandidateFit checked(const data::Experiment& e, double first = 0.0, double last = 1.0) {
   const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
   RegressionProblem data(prepared, Balance::motor);
-  const Terms terms = estimation::terms_of(testing::plain_model());
+  const Terms terms = estimation::terms_of(tests::plain_model());
   const Eigen::VectorXd keep = Eigen::VectorXd::Ones(data.rows());
   BalanceSearch search{&data, keep, cross_validate(data, terms, keep)};
-  CandidateFit candidate = testing::ripple_candidate(search, 3.0, keep);
+  CandidateFit candidate = tests::ripple_candidate(search, 3.0, keep);
   EXPECT_TRUE(passes(candidate)) << "else nothing is checked";
   const Eigen::Index rows = data.rows();
   for (Eigen::Index k = 0; k < rows; ++k) {
@@ -43,27 +43,27 @@ CandidateFit checked(const data::Experiment& e, double first = 0.0, double last 
 }
 
 TEST(CheckOrders, AnOrderThatManyTurnsShowPasses) {
-  const CandidateFit candidate = checked(testing::two_sines(20.0, 0.0, ripple));
+  const CandidateFit candidate = checked(tests::two_sines(20.0, 0.0, ripple));
   EXPECT_TRUE(candidate.admissible) << candidate.why_not;
   EXPECT_TRUE(candidate.note.empty());
 }
 
 TEST(CheckOrders, AFractionOfATurnCannotTellAnOrderFromOneThatNoDriveHas) {
-  const CandidateFit candidate = checked(testing::two_sines(0.5, 0.0, ripple));
+  const CandidateFit candidate = checked(tests::two_sines(0.5, 0.0, ripple));
   EXPECT_FALSE(candidate.admissible);
   EXPECT_NE(candidate.why_not.find("too short to distinguish orders"), std::string::npos) << candidate.why_not;
 }
 
 TEST(CheckOrders, WhatShowsInAFewPartsOfTheDataIsNoPropertyOfTheDrive) {
-  const CandidateFit few = checked(testing::two_sines(20.0, 0.0, ripple), 0.25, 0.7);
+  const CandidateFit few = checked(tests::two_sines(20.0, 0.0, ripple), 0.25, 0.7);
   EXPECT_FALSE(few.admissible);
   EXPECT_EQ(few.why_not, "it shows in 4 of 8 parts of the data only");
-  EXPECT_TRUE(checked(testing::two_sines(20.0, 0.0, ripple), 0.125, 0.95).admissible) << "seven parts are enough";
+  EXPECT_TRUE(checked(tests::two_sines(20.0, 0.0, ripple), 0.125, 0.95).admissible) << "seven parts are enough";
 }
 
 TEST(OneDirectionWarning, IsGivenWhereTheAxisHardlyComesBack) {
   const auto warning = [](double amplitude_rad, double drift_rad_s) {
-    const data::Experiment e = testing::two_sines(amplitude_rad, drift_rad_s, ripple);
+    const data::Experiment e = tests::two_sines(amplitude_rad, drift_rad_s, ripple);
     const estimation::PreparedData prepared = estimation::prepare({&e}, {}, kOptions);
     return one_direction_warning(RegressionProblem(prepared, Balance::motor));
   };
@@ -73,4 +73,4 @@ TEST(OneDirectionWarning, IsGivenWhereTheAxisHardlyComesBack) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_significance_checks_test

@@ -9,15 +9,14 @@
 #include "host/engine/selection/decision.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/stability_selection.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_stability_test {
 namespace {
 
 using data::Column;
-
-constexpr double kTurn = 6.283185307179586;
 
 std::vector<data::Experiment> with_viscous_asymmetry() {
   std::mt19937_64 random(1);
@@ -25,8 +24,8 @@ std::vector<data::Experiment> with_viscous_asymmetry() {
   std::vector<data::Experiment> all;
   for (const double frequency_hz : {0.41, 0.63}) {
     const double rate = kTurn * frequency_hz;
-    all.push_back(testing::written_experiment(
-        frequency_hz < 0.5 ? "slow" : "fast", 1e-2, 1000, [&](double t, data::Experiment& e) {
+    all.push_back(
+        tests::written_experiment(frequency_hz < 0.5 ? "slow" : "fast", 1e-2, 1000, [&](double t, data::Experiment& e) {
           const double q = 3.0 * std::sin(rate * t) + 0.7 * std::sin(2.3 * rate * t);
           const double w = 3.0 * rate * std::cos(rate * t) + 0.7 * 2.3 * rate * std::cos(2.3 * rate * t);
           const double a =
@@ -48,7 +47,7 @@ class SelectionOnHalves : public ::testing::Test {
     SelectionPolicy fewer = kPolicy;
     fewer.pairs = 4;
     fewer.bandwidths = 2;
-    return {pointers_, {}, estimation::terms_of(testing::plain_model()), Balance::motor, fewer};
+    return {pointers_, {}, estimation::terms_of(tests::plain_model()), Balance::motor, fewer};
   }
   static double frequency(const StabilitySelection& selection, std::string_view name) {
     for (const Frequency& f : selection.result().frequencies)
@@ -94,4 +93,4 @@ TEST(CandidateTables, PreslidingShowsAtBandwidthsOfTheMotionAloneAsLawsOfFrictio
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_stability_test

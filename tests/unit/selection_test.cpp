@@ -18,7 +18,7 @@
 #include "host/engine/selection/friction_random_effects.hpp"
 #include "host/engine/selection/halves.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_test {
 namespace {
 
 nlohmann::json statistics() {
@@ -478,4 +478,4 @@ TEST(Decision, NothingIsSaidWhereMostSubsamplesAbstain) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_test

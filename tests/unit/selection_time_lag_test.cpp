@@ -8,7 +8,7 @@
 #include "host/common/signals/butterworth.hpp"
 #include "host/engine/selection/time_lag.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_time_lag_test {
 namespace {
 
 constexpr double kSample_s = 4e-3;
@@ -101,4 +101,4 @@ TEST(TimeLag, BeyondTheSearchedRangeIsNotStated) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_time_lag_test

@@ -4,7 +4,7 @@
 
 #include "host/engine/selection/named_by_resampling.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_unseen_by_halves_test {
 namespace {
 
 // It takes off a share of the squared error on data left out, and leaves that part of the error on held-out
@@ -63,4 +63,4 @@ TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHalvesFindSomethingElse) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_unseen_by_halves_test

@@ -4,7 +4,7 @@
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/wald_test.hpp"
 
-namespace flexspline::selection {
+namespace flexspline::selection::selection_wald_test {
 namespace {
 
 estimation::Estimate value(double times_std) {
@@ -93,4 +93,4 @@ TEST(WaldTest, AConfoundedGroupStaysWhereOneOfItsMembersDiffersFromZeroAndGoesWh
 }
 
 }  // namespace
-}  // namespace flexspline::selection
+}  // namespace flexspline::selection::selection_wald_test

@@ -13,7 +13,7 @@
 #include "host/output/answers/sensitivity.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
-namespace flexspline::sensitivity {
+namespace flexspline::sensitivity::sensitivity_test {
 namespace {
 
 using data::Column;
@@ -327,4 +327,4 @@ TEST(SensitivityChange, WhatCannotBeDoneIsSaidWithWhatCould) {
 }
 
 }  // namespace
-}  // namespace flexspline::sensitivity
+}  // namespace flexspline::sensitivity::sensitivity_test

@@ -5,7 +5,7 @@
 
 #include <functional>
 
-namespace flexspline {
+namespace flexspline::sequence_lock_test {
 namespace {
 
 // Its copy can be interrupted between its halves.
@@ -39,4 +39,4 @@ TEST(SequenceLock, ACopyThatIsInterruptedOnceOrTwiceIsTakenAgainUntilItIsWhole) 
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::sequence_lock_test

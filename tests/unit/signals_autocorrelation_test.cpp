@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_autocorrelation_test {
 namespace {
 
 std::vector<double> autoregressive(double a, std::size_t n, unsigned seed, double offset = 0.0) {
@@ -72,4 +72,4 @@ TEST(AutocorrelationTime, OffsetsBetweenSegmentsCountAsCorrelation) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_autocorrelation_test

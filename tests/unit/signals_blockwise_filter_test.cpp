@@ -6,7 +6,7 @@
 
 #include <random>
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_blockwise_filter_test {
 namespace {
 
 // Columns that exist as a whole, and where their filtered samples came to.
@@ -64,4 +64,4 @@ TEST(FilterBlockwise, GivesTheSameOfShortSignalsSlowFiltersAndOtherOrders) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_blockwise_filter_test

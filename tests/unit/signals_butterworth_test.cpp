@@ -12,7 +12,7 @@
 
 #include "host/common/signals/differentiate.hpp"
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_butterworth_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -228,4 +228,4 @@ TEST(Differentiate, FewSamplesAndBadStepsAreHandled) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_butterworth_test

@@ -10,7 +10,7 @@
 
 #include "host/common/signals/butterworth.hpp"
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_cutoff_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -162,4 +162,4 @@ TEST(Cutoff, SignalsOfUnequalLengthAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_cutoff_test

@@ -11,7 +11,7 @@
 #include <set>
 #include <string>
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_differentiators_test {
 namespace {
 
 using std::numbers::pi;
@@ -293,4 +293,4 @@ TEST(Differentiators, ShortSignalsComeBackAsShort) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_differentiators_test

@@ -11,7 +11,7 @@
 #include "host/common/signals/butterworth.hpp"
 #include "host/common/signals/differentiate.hpp"
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_fused_velocity_test {
 namespace {
 
 constexpr double kSample_s = 1e-3, kCutoff_hz = 100.0;
@@ -99,4 +99,4 @@ TEST(FusedVelocity, TakesNoneThatHasMoreNoiseThanTheDerivative) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_fused_velocity_test

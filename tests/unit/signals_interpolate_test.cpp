@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_interpolate_test {
 namespace {
 
 double cubic(double t) {
@@ -117,4 +117,4 @@ TEST(Resample, TimesThatDoNotIncreaseAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_interpolate_test

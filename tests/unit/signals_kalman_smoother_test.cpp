@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_kalman_smoother_test {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -134,4 +134,4 @@ TEST(KalmanSmoother, RefusesWhatItCannotSmooth) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_kalman_smoother_test

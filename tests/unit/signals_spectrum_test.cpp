@@ -16,7 +16,7 @@
 
 #include "host/common/signals/fft.hpp"
 
-namespace flexspline::signals {
+namespace flexspline::signals::signals_spectrum_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -260,4 +260,4 @@ TEST(Repetition, OfTheMeasuredDriveAxisIsThePublishedOne) {
 }
 
 }  // namespace
-}  // namespace flexspline::signals
+}  // namespace flexspline::signals::signals_spectrum_test

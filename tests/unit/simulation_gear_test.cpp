@@ -14,6 +14,7 @@
 #include "host/physics/simulation/root.hpp"
 #include "host/physics/simulation/simulation.hpp"
 
+namespace flexspline::simulation_gear_test {
 namespace {
 
 using namespace flexspline;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -315,3 +316,4 @@ TEST(RootOfAnIncreasingFunction, IsFoundFromAnywhereAlsoWhereItIsSteepOrJumps) {
 }
 
 }  // namespace
+}  // namespace flexspline::simulation_gear_test

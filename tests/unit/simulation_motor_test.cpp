@@ -13,6 +13,7 @@
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/simulation/simulation.hpp"
 
+namespace flexspline::simulation_motor_test {
 namespace {
 
 using namespace flexspline;  // NOLINT(google-build-using-namespace): a test reads better without the prefix
@@ -273,3 +274,4 @@ TEST(Simulation, AModelThatDivergesEndsInNotANumber) {
 }
 
 }  // namespace
+}  // namespace flexspline::simulation_motor_test

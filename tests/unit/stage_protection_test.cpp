@@ -15,7 +15,7 @@
 #include "tests/support/virtual_drive.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::board {
+namespace flexspline::board::stage_protection_test {
 namespace {
 
 using control::protection::BrakeChopper;
@@ -299,4 +299,4 @@ TEST(StageProtection, AStageWithoutThosePartsIgnoresTheirInputs) {
 }
 
 }  // namespace
-}  // namespace flexspline::board
+}  // namespace flexspline::board::stage_protection_test

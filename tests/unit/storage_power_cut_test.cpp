@@ -10,17 +10,17 @@
 #include "shared/storage/parameter_store.hpp"
 #include "tests/support/flash_model.hpp"
 
-namespace flexspline {
+namespace flexspline::storage_power_cut_test {
 namespace {
 
 using storage::StoreError;
 using storage::StoreState;
-using testing::CutAt;
-using testing::PowerCut;
+using tests::CutAt;
+using tests::PowerCut;
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t kSector = 512;
-using Cells = testing::FlashCells<kSector>;
-using Flash = testing::FlashModel<kSector>;
+using Cells = tests::FlashCells<kSector>;
+using Flash = tests::FlashModel<kSector>;
 using Store = storage::ParameterStore<Flash>;
 
 // A block names itself in its first byte; the others follow from it.
@@ -380,4 +380,4 @@ TEST(ParameterStore, RestoresGoBackAndForthUntilTheSlotsAreUsedUpAndACommitMakes
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::storage_power_cut_test

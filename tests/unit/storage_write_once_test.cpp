@@ -10,17 +10,17 @@
 #include "shared/storage/parameter_store.hpp"
 #include "tests/support/write_once_model.hpp"
 
-namespace flexspline {
+namespace flexspline::storage_write_once_test {
 namespace {
 
 using storage::StoreError;
-using testing::CutAt;
-using testing::PowerCut;
+using tests::CutAt;
+using tests::PowerCut;
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t kSector = 768;
-using Cells = testing::OnceCells<kSector>;
-using Model = testing::OnceModel<kSector>;
-using Flash = testing::OnceFlash<kSector>;
+using Cells = tests::OnceCells<kSector>;
+using Model = tests::OnceModel<kSector>;
+using Flash = tests::OnceFlash<kSector>;
 using Store = storage::ParameterStore<Flash>;
 
 TEST(WriteOnceFlash, TakesADoubleWordOnceAfterAnEraseAndThenOnlyZeros) {
@@ -201,4 +201,4 @@ TEST(StoreOnWriteOnceFlash, TakesManyBlocksAndRestoresUntilItsSlotsAreUsed) {
 }
 
 }  // namespace
-}  // namespace flexspline
+}  // namespace flexspline::storage_write_once_test

@@ -10,7 +10,7 @@
 #include "tests/support/service_host.hpp"
 #include "tests/support/virtual_drive.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::stored_zero_test {
 namespace {
 
 using control::SensorKind;
@@ -153,4 +153,4 @@ TEST(StoredZero, StaysWithANewModelUnlessTheCountsDiffer) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::stored_zero_test

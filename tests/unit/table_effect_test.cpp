@@ -10,7 +10,7 @@
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "tests/support/drive_trial.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::table_effect_test {
 namespace {
 
 using catalogue::Balance;
@@ -282,4 +282,4 @@ TEST(TorqueOver, SamplesAnEffectAlongOneSignal) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::table_effect_test

@@ -11,7 +11,7 @@
 #include "host/common/text/unit_signs.hpp"
 #include "tests/unit/data_test_files.hpp"
 
-namespace flexspline::text {
+namespace flexspline::text::text_toml_test {
 namespace {
 
 std::string_view at(std::string_view text, Span span) {
@@ -127,4 +127,4 @@ TEST(DatasetToml, BrokenOrUnreadableFilesAreErrorsWithTheirLine) {
 }
 
 }  // namespace
-}  // namespace flexspline::text
+}  // namespace flexspline::text::text_toml_test

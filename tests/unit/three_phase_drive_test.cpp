@@ -11,7 +11,7 @@
 #include "tests/support/virtual_drive.hpp"
 #include "tests/unit/foc_rig.hpp"
 
-namespace flexspline::board {
+namespace flexspline::board::three_phase_drive_test {
 namespace {
 
 deployment::FocSetup foc_setup_of(const ThreePhaseParameters& p) {
@@ -229,4 +229,4 @@ TEST(ThreePhaseDrive, RefusesATickRateThatDoesNotDivideThePwm) {
 }
 
 }  // namespace
-}  // namespace flexspline::board
+}  // namespace flexspline::board::three_phase_drive_test

@@ -7,7 +7,7 @@
 #include "hil/twin/usb_line.hpp"
 #include "tests/support/usbip_client.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::twin_usb_line_test {
 namespace {
 
 using protocol::Kind;
@@ -120,4 +120,4 @@ TEST_F(UsbLine, AHostThatDoesNotReadLeavesRoomForNothingMore) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::twin_usb_line_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/usb_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usb_composite_test {
 namespace {
 
 constexpr std::uint8_t kSerial = 3;
@@ -204,4 +204,4 @@ TEST(UsbComposite, AnyRowOfRequestsLeavesItUsable) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usb_composite_test

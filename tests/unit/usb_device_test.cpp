@@ -8,7 +8,7 @@
 
 #include "tests/support/usb_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usb_device_test {
 namespace {
 
 constexpr std::uint8_t kSerial = 3;
@@ -162,4 +162,4 @@ TEST(UsbDevice, TakesItsAddressWhenTheHostHasSeenTheStatusStage) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usb_device_test

@@ -12,7 +12,7 @@
 #include "tests/support/update_bench.hpp"
 #include "tests/support/usb_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usb_dfu_test {
 namespace {
 
 using usb::DfuState;
@@ -314,19 +314,19 @@ TEST(UsbDfu, AnUploadEndsWithAShortBlockAndWithoutAnImageItSaysSo) {
 
 // The whole chain: the host's code, the drive's core and class, its boot loader, and flash memory.
 struct LoaderBoard {
-  using Slots = testing::SlotFlash;
+  using Slots = tests::SlotFlash;
   using Trust = boot::AnySigner;
   static constexpr bool kCanUpload = true;
-  static constexpr std::string_view kName = testing::kTestBoard;
+  static constexpr std::string_view kName = tests::kTestBoard;
   static constexpr std::uint32_t kEraseMs = 3, kBlockMs = 2, kCheckMs = 1;
   Slots& slots() { return flash; }
   bool takes_loader_request() { return std::exchange(request, false); }
-  testing::SlotFlash& flash;
+  tests::SlotFlash& flash;
   bool request = false;
 };
 struct LoaderBench {
   using Loader = firmware::BootLoader<LoaderBoard>;
-  explicit LoaderBench(testing::SlotCells& cells) : flash(cells) {
+  explicit LoaderBench(tests::SlotCells& cells) : flash(cells) {
     found = loader.start();
     loader.serve(bus.device.get<Loader::Dfu>());
     EXPECT_TRUE(bus.host.enumerate());
@@ -361,7 +361,7 @@ struct LoaderBench {
     }
     return {};
   }
-  testing::SlotFlash flash;
+  tests::SlotFlash flash;
   LoaderBoard board{flash};
   Loader loader{board};
   Bench<false, Loader::Dfu> bus;
@@ -375,27 +375,27 @@ bool contains(const std::string& text, const char* part) {
 
 TEST(UsbDfu, AnImageGoesFromTheHostToTheFirstStartWhateverTheSizeOfItsBlocks) {
   for (const std::size_t block : {4U, 60U, 64U, 512U, 1024U}) {
-    testing::SlotCells cells;
+    tests::SlotCells cells;
     LoaderBench b(cells);
     EXPECT_EQ(b.found, boot::Start::none);
-    EXPECT_EQ(b.download(testing::image_named('a', 101), block), "");
+    EXPECT_EQ(b.download(tests::image_named('a', 101), block), "");
     EXPECT_GE(b.pipe.waited, 3U + 1U) << "it waits as long as it is install_reported to";
     auto& dfu = b.bus.device.get<LoaderBench::Loader::Dfu>();
     EXPECT_FALSE(b.loader.poll(dfu, false, 10));
     EXPECT_TRUE(b.loader.poll(dfu, false, 1010)) << "it leaves by itself";
     LoaderBench next(cells);
     EXPECT_EQ(next.found, boot::Start::trial);
-    EXPECT_EQ(dfu::upload(next.pipe, 10'000, block), testing::image_named('a', 101));
+    EXPECT_EQ(dfu::upload(next.pipe, 10'000, block), tests::image_named('a', 101));
   }
 }
 
 TEST(UsbDfu, WhatIsNoImageForThisBoardIsRefusedAndCostsNothing) {
-  testing::SlotCells cells;
-  { LoaderBench(cells).download(testing::image_named('a')); }
+  tests::SlotCells cells;
+  { LoaderBench(cells).download(tests::image_named('a')); }
   LoaderBench b(cells);
   ASSERT_EQ(b.found, boot::Start::trial);
-  ASSERT_TRUE(testing::TestSlots(b.flash, testing::kTestBoard).confirm());
-  const Octets good = testing::image_named('b');
+  ASSERT_TRUE(tests::TestSlots(b.flash, tests::kTestBoard).confirm());
+  const Octets good = tests::image_named('b');
   Octets damaged = good, no_image = good, short_one = good, longer = good, bad_header = good;
   damaged[boot::kHeaderBytes + 9] ^= 1;
   no_image[0] ^= 1;
@@ -403,37 +403,37 @@ TEST(UsbDfu, WhatIsNoImageForThisBoardIsRefusedAndCostsNothing) {
   short_one.resize(good.size() - 8);
   longer.resize(good.size() + 8);
   for (const std::size_t block : {64U, 1024U}) {
-    EXPECT_TRUE(contains(b.download(testing::image_named('b', 42, "another"), block), "errTARGET"));
+    EXPECT_TRUE(contains(b.download(tests::image_named('b', 42, "another"), block), "errTARGET"));
     EXPECT_TRUE(contains(b.download(damaged, block), "errVERIFY"));
     EXPECT_TRUE(contains(b.download(no_image, block), "errFILE"));
     EXPECT_TRUE(contains(b.download(bad_header, block), "errFILE"));
     EXPECT_TRUE(contains(b.download(short_one, block), "errNOTDONE"));
     EXPECT_TRUE(contains(b.download(longer, block), "errNOTDONE"));
-    EXPECT_TRUE(contains(b.download(testing::image_named('b', 500), block), "errFILE")) << "longer than the slot";
+    EXPECT_TRUE(contains(b.download(tests::image_named('b', 500), block), "errFILE")) << "longer than the slot";
   }
-  EXPECT_EQ(dfu::upload(b.pipe, 10'000, 64), testing::image_named('a'));
+  EXPECT_EQ(dfu::upload(b.pipe, 10'000, 64), tests::image_named('a'));
   EXPECT_EQ(LoaderBench(cells).found, boot::Start::application);
   EXPECT_EQ(b.download(good), "");
   EXPECT_EQ(LoaderBench(cells).found, boot::Start::trial);
 }
 
 TEST(UsbDfu, AMemoryThatDoesNotTakeTheImageIsSaidToBeSo) {
-  testing::SlotCells cells;
+  tests::SlotCells cells;
   LoaderBench b(cells);
   b.flash.fail_from_now();
-  EXPECT_TRUE(contains(b.download(testing::image_named('a')), "flash memory"));
+  EXPECT_TRUE(contains(b.download(tests::image_named('a')), "flash memory"));
 }
 
 TEST(UsbDfu, ABusResetAfterItWasUsedEndsDfuModeWhereThereIsSomethingToStart) {
-  testing::SlotCells cells;
+  tests::SlotCells cells;
   LoaderBench empty(cells);
   auto& dfu = empty.bus.device.get<LoaderBench::Loader::Dfu>();
   EXPECT_FALSE(empty.loader.poll(dfu, true, 0)) << "enumeration";
   dfu::get_status(empty.pipe);
   EXPECT_FALSE(empty.loader.poll(dfu, true, 0)) << "nothing to start";
-  ASSERT_EQ(empty.download(testing::image_named('a')), "");
+  ASSERT_EQ(empty.download(tests::image_named('a')), "");
   EXPECT_TRUE(empty.loader.poll(dfu, true, 0));
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usb_dfu_test

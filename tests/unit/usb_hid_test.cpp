@@ -5,7 +5,7 @@
 
 #include "tests/support/usb_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usb_hid_test {
 namespace {
 
 class UsbHid : public ::testing::Test {
@@ -196,4 +196,4 @@ TEST_F(UsbHid, AResetOrAnotherConfigurationEmptiesTheQueues) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usb_hid_test

@@ -3,7 +3,7 @@
 
 #include "tests/support/usb_parts.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usb_suspend_test {
 namespace {
 
 struct WakingPort : TestPort<false> {
@@ -92,4 +92,4 @@ TEST(UsbSuspend, TheFeatureBelongsToADeviceWithAnAddress) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usb_suspend_test

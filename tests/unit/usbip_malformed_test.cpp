@@ -16,7 +16,7 @@
 #include "shared/usb/identity.hpp"
 #include "tests/support/usbip_client.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usbip_malformed_test {
 namespace {
 
 using Reports = usb::Hid<8, 4>;
@@ -218,4 +218,4 @@ TEST_F(UsbIpMalformed, DamagedConversationsDoNoHarm) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usbip_malformed_test

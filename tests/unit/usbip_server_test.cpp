@@ -15,7 +15,7 @@
 #include "shared/usb/identity.hpp"
 #include "tests/support/usbip_client.hpp"
 
-namespace flexspline::tests {
+namespace flexspline::tests::usbip_server_test {
 namespace {
 
 using Reports = usb::Hid<8, 4>;
@@ -361,4 +361,4 @@ TEST_F(UsbIpServer, RefusesBusIdsAndDevicesThatAreNone) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests
+}  // namespace flexspline::tests::usbip_server_test

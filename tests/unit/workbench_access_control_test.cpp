@@ -7,7 +7,7 @@
 #include <fstream>
 #include <set>
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_access_control_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,4 +75,4 @@ TEST(WorkbenchAccessControl, FollowsNoLinkOutOfTheFolder) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_access_control_test

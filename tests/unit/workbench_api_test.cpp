@@ -15,7 +15,7 @@
 #include "host/engine/selection/add.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_api_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -472,4 +472,4 @@ TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_api_test

@@ -9,7 +9,7 @@
 #include "host/app/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_begin_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -184,4 +184,4 @@ TEST_F(WorkbenchBegin, ChoicesOfTheWrongKindAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_begin_test

@@ -13,7 +13,7 @@
 #include "tests/support/loopback.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_live_drive_test {
 namespace {
 
 using nlohmann::json;
@@ -195,4 +195,4 @@ TEST_F(WorkbenchLiveDrive, AnotherDriveInItsPlaceIsNotConnected) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_live_drive_test

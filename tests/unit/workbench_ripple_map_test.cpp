@@ -8,7 +8,7 @@
 #include "host/app/workbench/work.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_ripple_map_test {
 namespace {
 
 using nlohmann::json;
@@ -50,4 +50,4 @@ TEST(RippleMap, HasSixBinsForEachWaveOfTheLargestOrder) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_ripple_map_test

@@ -14,7 +14,7 @@
 
 #include "host/engine/estimation/cancellation.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_supervisor_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -141,4 +141,4 @@ TEST_F(Supervisor, WorkersThatAllEndAtTheirBeginningAreGivenUp) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_supervisor_test

@@ -10,7 +10,7 @@
 
 #include "host/app/workbench/history.hpp"
 
-namespace flexspline::workbench {
+namespace flexspline::workbench::workbench_window_test {
 namespace {
 
 // As the page reads a packed signal.
@@ -143,4 +143,4 @@ TEST(WorkbenchHistory, ForgetsTheOtherWayWhereANewStepIsTaken) {
 }
 
 }  // namespace
-}  // namespace flexspline::workbench
+}  // namespace flexspline::workbench::workbench_window_test
