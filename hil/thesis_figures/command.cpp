@@ -31,8 +31,11 @@ std::string made(const Figure& figure, const ReportOptions& options) {
   const Drawn drawn = figure.make(options.seed);
   write(folder / (name + ".svg"), svg(fmt::format("Figure {}: {}", figure.number, figure.title), drawn.panels));
   write(folder / (name + ".csv"), csv(drawn.panels));
+  // The row has the title already.
+  std::string ours = drawn.ours;
+  if (ours.starts_with(figure.title + ": ")) ours.erase(0, figure.title.size() + 2);
   return fmt::format("| {} | [{}]({}.svg) | {} | {} |\n", figure.number, cell(figure.title), name, cell(figure.theirs),
-                     cell(drawn.ours));
+                     cell(ours));
 }
 
 void write_all(const std::vector<const Figure*>& wanted, const ReportOptions& options) {
