@@ -45,10 +45,10 @@ void write_all(const std::vector<const Figure*>& wanted, const ReportOptions& op
     if (figure->make)
       rows += made(*figure, options);
     else
-      rest += fmt::format("| {} | {} | {} |\n", figure->number, cell(figure->title), cell(figure->why_not));
+      rest += fmt::format("{}{}", rest.empty() ? "" : ", ", figure->number);
   }
   std::string text = "| figure | what | the report says | ours |\n| --- | --- | --- | --- |\n" + rows;
-  if (!rest.empty()) text += "\nNot made:\n\n| figure | what | why not |\n| --- | --- | --- |\n" + rest;
+  if (!rest.empty()) text += "\nNot made (`flexspline-hil report list` says why): " + rest + ".\n";
   write(std::filesystem::path(options.out) / "figures.md", text);
   fmt::print("{}\n", (std::filesystem::path(options.out) / "figures.md").string());
 }
