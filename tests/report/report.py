@@ -219,11 +219,11 @@ def negative_amplitude(page, rows):
 
     def change(a):
         return f"{100.0 * (a['10'] / a['02'] - 1.0):+.0f} %"
-    page.add("", "At standstill the torque has any value within the static friction, and the velocity's sign is that of its noise: the mean of such samples is minus",
-             "the Coulomb friction, and a term of 0.1 rad/s takes it. So standstill alone makes the amplitude negative. From 0.2 to 1 Hz",
+    page.add("", "At standstill the torque has any value within the static friction, and the velocity's sign is that of its noise: such samples have minus",
+             "the Coulomb friction in the mean, which a term of 0.1 rad/s takes. So standstill alone makes the amplitude negative. From 0.2 to 1 Hz",
              f"it changes by {change(alone)}, as more of the samples below 0.1 rad/s move; the printed rows by {change({k: v[1] for k, v in means.items()})} (negative direction) and",
              f"{change({k: v[0] for k, v in means.items()})} (positive). That explains the sign, and in the negative direction that it falls, not by how much.",
-             "The tool's default mask leaves standstill out; whether the report did it does not say. A Dahl law gives a negative amplitude too, but one that grows with the frequency.", "")
+             "The tool's default mask leaves standstill out; the report does not say whether it did. A Dahl law's negative amplitude would grow with the frequency.", "")
 
 
 def motor(page, tool, data, out):
@@ -232,7 +232,7 @@ def motor(page, tool, data, out):
         p["parameter"] == "relative_error" for p in found["parameters"]) else next(
             p for p in found["parameters"] if p["effect"] == "torque_constant_error")
     page.add("### Tables 2 and 3: the bare motor", "",
-             "Partly circular: of the report's rows the scan has the last column alone; the others are drawn about the final decision with the",
+             "Partly circular: the scan has the last column alone; other rows are drawn about the final decision with the",
              "printed std/final. The inertia is supplied, as in the report.", "",
              "| parameter | printed, final | ours, average | printed std/final | ours | experiments |", "| --- | ---: | ---: | ---: | ---: | ---: |")
     lines = [("T_vn", "4.2e-5", 23.3, derived(found, "Tvn")), ("T_vp", "4.2e-5", 11.5, derived(found, "Tvp")),

@@ -64,7 +64,7 @@ def common_model(page, tool, data, out):
         for signal in own:
             own[signal].update(errors_of(compared, signal) if compared else {})
     page.add("The report finds an \"accurate match\" of one model, the averages, on more than twenty experiments. The same averages on the 26 runs of",
-             "table 7, whose rows differ by 16 to 24 %, by `flexspline compare`: error over the signal's standard deviation. Not circular: averages and rows are the report's.", "",
+             "table 7, whose rows differ by 16 to 24 %: error over the signal's standard deviation. Not circular: averages and rows are the report's.", "",
              "| signal | common model: median | largest | each run's own model: median | largest |", "| --- | ---: | ---: | ---: | ---: |")
     for signal, name in (("motor_velocity", "motor velocity, free run"), ("motor_balance", "motor torque")):
         ours = errors_of(common, signal)
@@ -167,9 +167,9 @@ def diagnosed(page, tool, cases_tool, data, out):
     done = subprocess.run([sys.executable, str(HERE / "diagnose_cases.py"), str(tool), str(cases)], capture_output=True, text=True)
     (out / "diagnose.txt").write_text(done.stdout + done.stderr)
     page.add("## What `diagnose` names", "",
-             "Each row alone, each table as a whole, and tables 4, 7 and 8 together (whole drive). In a single row nothing is missing: a name is false.",
+             "Whole drive: tables 4, 7 and 8 together. In a single row nothing is missing: a name is false.",
              "In table 7 as a whole the viscosity falls with the amplitude (power -0.65): sublinear friction is right. In the whole drive the slower runs of table 8",
-             "contradict that law (they have table 7's average viscosity, 3.6e-4 N m s/rad, where the law has more): right is the law for a range of speeds, without a name.", "",
+             "contradict that law (average viscosity, 3.6e-4 N m s/rad; the law has more): right is the law for a range of speeds, without a name.", "",
              "| records | verdict | named | result | s |", "| --- | --- | --- | --- | ---: |")
     rows = [line for line in done.stdout.splitlines() if line.startswith("| ")]
     if not rows:
