@@ -25,27 +25,34 @@ const Figure& find(int number) {
   throw std::invalid_argument(fmt::format("the report has no figure {}; it has 1 to {}", number, figures().size()));
 }
 
-std::string made(const Figure& figure, const ReportOptions& options) {
+// `firsts`: what a figure measures, with the first figure that does.
+std::string made(const Figure& figure, const ReportOptions& options, std::map<std::string, int>& firsts) {
   const std::string name = fmt::format("figure-{:02}", figure.number);
   const std::filesystem::path folder = options.out;
   const Drawn drawn = figure.make(options.seed);
   write(folder / (name + ".svg"), svg(fmt::format("Figure {}: {}", figure.number, figure.title), drawn.panels));
   write(folder / (name + ".csv"), csv(drawn.panels));
+  // The row has the title already.
+  std::string ours = drawn.ours;
+  if (ours.starts_with(figure.title + ": ")) ours.erase(0, figure.title.size() + 2);
+  const int first = firsts.emplace(ours, figure.number).first->second;
+  if (first != figure.number) ours = fmt::format("as figure {}", first);
   return fmt::format("| {} | [{}]({}.svg) | {} | {} |\n", figure.number, cell(figure.title), name, cell(figure.theirs),
-                     cell(drawn.ours));
+                     cell(ours));
 }
 
 void write_all(const std::vector<const Figure*>& wanted, const ReportOptions& options) {
   std::filesystem::create_directories(options.out);
   std::string rows, rest;
+  std::map<std::string, int> firsts;
   for (const Figure* figure : wanted) {
     if (figure->make)
-      rows += made(*figure, options);
+      rows += made(*figure, options, firsts);
     else
-      rest += fmt::format("| {} | {} | {} |\n", figure->number, cell(figure->title), cell(figure->why_not));
+      rest += fmt::format("{}{}", rest.empty() ? "" : ", ", figure->number);
   }
   std::string text = "| figure | what | the report says | ours |\n| --- | --- | --- | --- |\n" + rows;
-  if (!rest.empty()) text += "\nNot made:\n\n| figure | what | why not |\n| --- | --- | --- |\n" + rest;
+  if (!rest.empty()) text += "\nNot made (`flexspline-hil report list` says why): " + rest + ".\n";
   write(std::filesystem::path(options.out) / "figures.md", text);
   fmt::print("{}\n", (std::filesystem::path(options.out) / "figures.md").string());
 }

@@ -160,12 +160,10 @@ Drawn static_and_dynamic(std::uint64_t seed) {
     panel.curves.push_back(run.loop("static", of_rate, Stroke::dashed));
     panel.curves.push_back(run.loop("dynamic", of_state, Stroke::dotted));
     const double measured = area(panel.curves[0]);
-    drawn.ours += fmt::format(
-        "{}twin with {}: error of the torque static {:.2g} %, dynamic {:.2g} %, loop of the dynamic model {:.0f} % of "
-        "the "
-        "measured area",
-        drawn.ours.empty() ? "" : "; ", truth, error_percent(run.torque, of_rate), error_percent(run.torque, of_state),
-        100.0 * area(panel.curves[2]) / measured);
+    drawn.ours +=
+        fmt::format("{}twin with {}: torque, static {:.2g} %, dynamic {:.2g} %; dynamic loop {:.0f} % of the area",
+                    drawn.ours.empty() ? "" : "; ", truth, error_percent(run.torque, of_rate),
+                    error_percent(run.torque, of_state), 100.0 * area(panel.curves[2]) / measured);
     drawn.panels.push_back(std::move(panel));
   }
   return drawn;
@@ -173,7 +171,7 @@ Drawn static_and_dynamic(std::uint64_t seed) {
 
 Drawn exponents(std::uint64_t seed) {
   const LockedRun run(rhs100::table_4(), "100-8", seed);
-  Drawn drawn{{run.panel("100-8")}, "error of the torque:"};
+  Drawn drawn{{run.panel("100-8")}, "torque:"};
   const std::pair<double, Stroke> kinds[] = {{1.0, Stroke::dashed}, {0.5, Stroke::dash_dotted}, {0.1, Stroke::dotted}};
   for (const auto& [alpha, stroke] : kinds) {
     const auto [k1, damping] = run.regress(alpha);
@@ -181,7 +179,7 @@ Drawn exponents(std::uint64_t seed) {
     drawn.panels[0].curves.push_back(run.loop(fmt::format("alpha {:g}", alpha), y, stroke));
     drawn.ours += fmt::format(" alpha {:g} {:.2g} %;", alpha, error_percent(run.torque, y));
   }
-  drawn.ours += " alpha = 1/2 is what the twin's rows have (circular)";
+  drawn.ours += " circular: the twin has 1/2";
   return drawn;
 }
 
@@ -194,12 +192,12 @@ Drawn half_and_third(std::uint64_t seed) {
   panel.curves.push_back(run.loop("alpha 1/2", half, Stroke::dashed));
   panel.curves.push_back(run.loop("alpha 1/3", third, Stroke::dotted));
   return {{panel},
-          fmt::format("error of the torque: alpha 1/2 {:.2g} %, 1/3 {:.2g} % (the twin has 1/2: circular)",
+          fmt::format("torque: alpha 1/2 {:.2g} %, 1/3 {:.2g} %; circular: the twin has 1/2",
                       error_percent(run.torque, half), error_percent(run.torque, third))};
 }
 
 Drawn optimal(std::uint64_t seed) {
-  Drawn drawn{{}, "error of the torque, optimal / one half, values of tables 5 and 4:"};
+  Drawn drawn{{}, "torque, optimal / one half, by tables 5 and 4:"};
   struct Row {
     const char* name;
     double k1, damping, alpha;
@@ -241,7 +239,7 @@ Drawn cubic(std::uint64_t seed) {
 }
 
 Drawn nominal(bool over_time, std::uint64_t seed) {
-  Drawn drawn{{}, "error of the torque with the averages of eq. 79:"};
+  Drawn drawn{{}, "torque, averages of eq. 79:"};
   for (const char* name : {"100-8", "50-8", "50-1", "50-7"}) {
     const LockedRun run(rhs100::table_4(), name, seed);
     const auto y = run.model(published::kStiffness, 0.0, published::kDampingTorque, 0.5);

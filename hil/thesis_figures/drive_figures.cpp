@@ -73,9 +73,7 @@ report::FrictionCurve row_of(const char* name, double& inertia) {
 
 Drawn friction_torques(const rhs100::Set& set, const std::vector<const char*>& names, bool own_row,
                        std::uint64_t seed) {
-  Drawn drawn{
-      {},
-      own_row ? "error of the torque in motion, each row's own values:" : "error of the torque in motion, averages:"};
+  Drawn drawn{{}, own_row ? "torque in motion, each row's own values:" : "torque in motion, averages:"};
   for (const char* name : names) {
     const Balance balance(set, name, seed);
     double inertia = published::kEffectiveInertia;
@@ -159,9 +157,8 @@ struct Verified {
                             "torque, N m",
                             {part("measured (twin)", record, torque, from(), to(), measured),
                              part("simulation", record, simulated_torque, from(), to(), simulated)}});
-    drawn.ours +=
-        fmt::format("{}{}: error of the velocity {:.2g} %, of the torque {:.2g} %", drawn.ours.empty() ? "" : "; ",
-                    name, error_percent(velocity, simulated_velocity), error_percent(torque, simulated_torque));
+    drawn.ours += fmt::format("{}{}: velocity {:.2g} %, torque {:.2g} %", drawn.ours.empty() ? "" : "; ", name,
+                              error_percent(velocity, simulated_velocity), error_percent(torque, simulated_torque));
   }
 };
 
@@ -188,7 +185,7 @@ struct Variant {
 
 Drawn compare(const plant::Record& record, const std::vector<Variant>& variants, const char* title) {
   const std::vector<double> velocity = zero_phase(record.motor_velocity_rad_s, kCutoffHz, kHz);
-  Drawn drawn{{}, "error of the velocity:"};
+  Drawn drawn{{}, "velocity:"};
   for (std::size_t k = 1; k < variants.size(); ++k) {
     Panel panel{std::string(title) + ", " + variants[k].name,
                 "time, s",

@@ -81,8 +81,7 @@ Drawn verification(const rhs100::Set& set, const std::vector<const char*>& names
     drawn.panels.push_back(std::move(panel));
     drawn.ours += (drawn.ours.empty() ? "" : "; ") + text;
   }
-  drawn.ours =
-      (with_modified ? "error of the velocity, one friction / by direction: " : "error of the velocity: ") + drawn.ours;
+  drawn.ours = (with_modified ? "velocity, one friction / by direction: " : "velocity: ") + drawn.ours;
   return drawn;
 }
 

@@ -74,7 +74,7 @@ def main():
                          f"{law['highest_speed']:.3g} rad/s (p = {law['p_value']:.2g})")
             print(f"| {name} {label} | {answer['verdict']} | {text} | {result} | {seconds:.1f} |", flush=True)
     print(f"\n{false_answers} of {answers} answers with a false name; {met} of {to_name} that should be named are; "
-          f"{said} of {to_say} laws of a range of speeds are told.")
+          f"{said} of {to_say} laws of a range of speeds are stated.")
     return 1 if false_answers or met < to_name or said < to_say else 0
 
 

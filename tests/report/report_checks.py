@@ -63,9 +63,8 @@ def common_model(page, tool, data, out):
         compared, _ = answer_of((tool, "compare", "--model", fitted, data / "table-7" / f"{run}.csv"), out / f"own-{run}.json") if found else (None, "")
         for signal in own:
             own[signal].update(errors_of(compared, signal) if compared else {})
-    page.add("The report verifies one model, the averages, on more than twenty experiments and finds an \"accurate match\". The same averages on the 26 runs of",
-             "table 7, whose rows differ by 16 to 24 %, by `flexspline compare`: the error of a free run under the measured current, and of the torque that the",
-             "motion needs, over the signal's standard deviation. Not circular: the averages are the report's, and the runs have its rows.", "",
+    page.add("The report finds an \"accurate match\" of one model, the averages, on more than twenty experiments. The same averages on the 26 runs of",
+             "table 7, whose rows differ by 16 to 24 %: error over the signal's standard deviation. Not circular: averages and rows are the report's.", "",
              "| signal | common model: median | largest | each run's own model: median | largest |", "| --- | ---: | ---: | ---: | ---: |")
     for signal, name in (("motor_velocity", "motor velocity, free run"), ("motor_balance", "motor torque")):
         ours = errors_of(common, signal)
@@ -73,14 +72,14 @@ def common_model(page, tool, data, out):
         mine = own[signal]
         page.add(f"| {name} | {statistics.median(ours.values()):.3g} % | {ours[worst]:.3g} % ({worst}) | "
                  + (f"{statistics.median(mine.values()):.2g} % | {max(mine.values()):.2g} % |" if mine else "– | – |"))
-    page.add("", "So the match of figures 45 and 55 to 60 shows runs whose values are near the averages. The rows' own spread, and no missing term, is what is left.", "")
+    page.add("", "So in figures 45 and 55 to 60 match runs whose values are near the averages. What is left is the spread of the rows, not a missing term.", "")
 
 
 def derivatives(page, tool, data, out, figures):
     """Section 1.3.4 and 4.3: ways to a derivative, on the output's encoder, which has no tachometer."""
     run = "50-1-06"
-    page.add("## Derivatives", "", f"`flexspline derivatives` on run {run} of table 7. The Kalman smoother is that of Rauch, Tung and Striebel; its covariances are the most",
-             "likely ones. Noise is what the position's noise leaves; the reference is the measured velocity, at the output, where there is none, the smoother.", "")
+    page.add("## Derivatives", "", f"`flexspline derivatives` on run {run} of table 7. `kalman-rts`: smoother of Rauch, Tung and Striebel, covariances by maximum",
+             "likelihood. Noise: what the position's noise causes. Reference: the measured velocity; the output has none, there the smoother.", "")
     found, problem = answer_of((tool, "derivatives", data / "table-7" / f"{run}.csv", "--picture", figures / "derivatives.svg"), out / "derivatives.json")
     if found is None:
         page.add(problem, "")
@@ -168,23 +167,22 @@ def diagnosed(page, tool, cases_tool, data, out):
     done = subprocess.run([sys.executable, str(HERE / "diagnose_cases.py"), str(tool), str(cases)], capture_output=True, text=True)
     (out / "diagnose.txt").write_text(done.stdout + done.stderr)
     page.add("## What `diagnose` names", "",
-             "Each row of tables 4, 6, 7 and 8 alone, each table as a whole, and tables 4, 7 and 8 together. A single row has one viscosity, so there is nothing in it to",
-             "name, and a name would be false. Table 7 as a whole has viscosities that fall with the amplitude (power -0.65): sublinear friction is to be named there.",
-             "In all tables together the slower runs of table 8 contradict that law: they have table 7's average viscosity (3.6e-4 N m s/rad), where the law has more. So",
-             "there it is not to be named, and is to be told for the range of speeds that it holds for.", "")
+             "Whole drive: tables 4, 7 and 8 together. In a single row nothing is missing: a name is false.",
+             "In table 7 as a whole the viscosity falls with the amplitude (power -0.65): sublinear friction is right. In the whole drive the slower runs of table 8",
+             "contradict that law (average viscosity, 3.6e-4 N m s/rad; the law has more): right is the law for a range of speeds, without a name.", "",
+             "| records | verdict | named | result | s |", "| --- | --- | --- | --- | ---: |")
     rows = [line for line in done.stdout.splitlines() if line.startswith("| ")]
     if not rows:
         page.add(done.stderr.strip()[-300:], "")
         return
     cells = [[c.strip() for c in row.strip("|").split("|")] for row in rows[2:]]
-    for title, wanted in (("table 4", "table-4-rows"), ("table 6", "table-6-rows"), ("table 7", "table-7-rows"), ("table 8", "table-8-rows")):
-        of = [c for c in cells if c[0].startswith(wanted)]
-        verdicts = {v: sum(c[1] == v for c in of) for v in sorted({c[1] for c in of})}
-        false = [f"{c[0].split('/')[1]} ({c[2]})" for c in of if c[3] == "FALSE"]
-        page.add(f"- {title}, {len(of)} rows: " + ", ".join(f"`{v}` {n}" for v, n in verdicts.items()) +
-                 f"; **{len(false)} false names**{': ' + ', '.join(false) if false else ''}")
-    failures = {"missed": "**a failure: sublinear friction is to be named (told, for the whole drive) and is not**", "FALSE": "**a failure: the name is false**", "right": "right"}
+    for number_of_table in (4, 6, 7, 8):
+        of = [c for c in cells if c[0].startswith(f"table-{number_of_table}-rows")]
+        verdicts = ", ".join(f"{v} {sum(c[1] == v for c in of)}" for v in sorted({c[1] for c in of}))
+        named = ", ".join(f"{c[0].split('/')[1]}: {c[2]}" for c in of if c[2] not in ("-", "")) or "-"
+        seconds = sorted(float(c[4]) for c in of)
+        page.add(f"| {len(of)} rows of table {number_of_table} | {verdicts} | {named} | {sum(c[3] == 'FALSE' for c in of)} false | {seconds[0]:g} to {seconds[-1]:g} |")
     for c in cells:
         if "/" not in c[0]:
-            page.add(f"- {c[0].replace('-', ' ')} as a whole: `{c[1]}`, named: {c[2]}; {failures.get(c[3], c[3] or c[1])}")
-    page.add("", *rows, "", done.stdout.strip().splitlines()[-1], "")
+            page.add(f"| {c[0].replace('-', ' ')} | {' | '.join(c[1:])} |")
+    page.add("", done.stdout.strip().splitlines()[-1], "")
