@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace flexspline::worlds {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 double peak_velocity(const Twin& twin) {
   double peak = 0.0;

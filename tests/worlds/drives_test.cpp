@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <numbers>
 #include <string>
 
 #include "tests/worlds/drives/make.hpp"
@@ -15,7 +14,6 @@
 namespace flexspline::worlds::drives {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kStep_s = 2e-5;
 
 Mechanics one_mass() {

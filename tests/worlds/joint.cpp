@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace flexspline::worlds {
 namespace {
@@ -12,7 +11,6 @@ constexpr double kLead_s = 0.6;
 constexpr double kWarmUp_s = 20.0;
 constexpr double kFrictionNoise_s = 0.05;  // correlation time of coloured friction
 constexpr double kPulse_s = 0.02;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 // Bristles shorter than this turn round within a step.
 constexpr double kNoPresliding = 1e-9;
 

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 
 namespace flexspline::worlds {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kRange = 1.6;  // rad to each side
 
 Reference moved(const Reference& start, double time_s) {

@@ -1,12 +1,15 @@
 // Motions of a joint as its controller is asked for them, with exact derivatives. Angles are those of the output.
 #pragma once
 
+#include <numbers>
 #include <string_view>
 #include <vector>
 
 #include "tests/worlds/random.hpp"
 
 namespace flexspline::worlds {
+
+inline constexpr double kTurn = 2.0 * std::numbers::pi;  // rad
 
 struct Reference {
   double position = 0.0, velocity = 0.0, acceleration = 0.0;

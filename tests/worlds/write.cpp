@@ -6,14 +6,12 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <stdexcept>
 
 namespace flexspline::worlds {
 namespace {
 
 constexpr double kFine_s = 1.0 / 8000.0;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kNoiseMemory_s = 0.02;
 constexpr double kReference_c = 30.0;
 

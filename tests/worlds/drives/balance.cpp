@@ -8,7 +8,6 @@ namespace flexspline::worlds::drives {
 namespace {
 
 using Column = std::vector<double>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Column derivative(const Column& signal, double rate_hz) {
   Column out(signal.size(), 0.0);

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 namespace flexspline::worlds::drives {
 namespace {
-
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 double in(Random& random, const Range& range) {
   return range.low > 0.0 ? random.log_uniform(range.low, range.high) : 0.0;

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <stdexcept>
 
 namespace flexspline::worlds::drives {
 namespace {
 
 using Positions = std::vector<double>;
-constexpr double kTurn = 2.0 * std::numbers::pi;
 
 std::size_t samples_of(const MotionRequest& request) {
   return static_cast<std::size_t>(std::lround(request.duration_s / request.period_s));

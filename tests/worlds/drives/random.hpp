@@ -9,6 +9,8 @@
 
 namespace flexspline::worlds::drives {
 
+inline constexpr double kTurn = 2.0 * std::numbers::pi;  // rad
+
 /// Random numbers that are the same on every machine: xoshiro256++ (Blackman and Vigna, ACM TOMS 47, 2021), seeded by
 /// splitmix64. A stream has a name, so that a draw more in one does not change the others.
 class Random {

@@ -17,11 +17,6 @@ ZeroPhaseLowPass account_filter(const Machine& m) {
   return {std::min(m.account_cutoff_hz, kMostCutoff * rate), rate};
 }
 
-Signal scaled(Signal x, double factor) {
-  for (double& v : x) v *= factor;
-  return x;
-}
-
 void subtract(Signal& from, const Signal& x, double factor = 1.0) {
   for (std::size_t k = 0; k < from.size(); ++k) from[k] -= factor * x[k];
 }

@@ -10,11 +10,6 @@ namespace {
 
 using Term = std::function<Signal(const Run&)>;
 
-Signal scaled(Signal x, double factor) {
-  for (double& v : x) v *= factor;
-  return x;
-}
-
 Signal added(Signal x, const Signal& y, double factor = 1.0) {
   for (std::size_t k = 0; k < x.size(); ++k) x[k] += factor * y[k];
   return x;

@@ -15,7 +15,7 @@ constexpr double kSteepness = 0.01;      // of the reference velocity, over whic
 constexpr double kGravityBelief = 0.95;  // what the controller knows of the sine part
 constexpr double kRunaway_rad = 1e7;
 
-double rounded(double value, double step) {
+double rounded_half_up(double value, double step) {
   return step > 0.0 ? step * std::floor(value / step + 0.5) : value;
 }
 
@@ -37,9 +37,10 @@ class PositionController {
     const ElectricParameters& e = plant_.electric;
     const EncoderParameters& s = plant_.encoder;
     const double period = 1.0 / kControlRate_hz, inertia = plant_.total_inertia_kgm2();
-    const double seen = rounded(angle_rad + s.eccentricity_rad * std::sin(angle_rad + s.eccentricity_phase_rad) +
-                                    s.noise_rad * inputs_.encoder_noise[k],
-                                s.step_rad);
+    const double seen =
+        rounded_half_up(angle_rad + s.eccentricity_rad * std::sin(angle_rad + s.eccentricity_phase_rad) +
+                            s.noise_rad * inputs_.encoder_noise[k],
+                        s.step_rad);
     const double difference = k == 0 ? 0.0 : (seen - last_rad_) / period;
     last_rad_ = seen;
     velocity_rad_s_ += c.velocity_filter * (difference - velocity_rad_s_);
@@ -50,7 +51,7 @@ class PositionController {
     const double torque = stiffness * error +
                           2.0 * kDamping * inertia * c.bandwidth_rad_s * (inputs_.velocity_rad_s[k] - velocity_rad_s_) +
                           integral_nm_ + feedforward(k);
-    return rounded(std::clamp(torque / e.torque_constant_nm_a, -e.limit_a, e.limit_a), e.step_a);
+    return rounded_half_up(std::clamp(torque / e.torque_constant_nm_a, -e.limit_a, e.limit_a), e.step_a);
   }
 
  private:

@@ -8,7 +8,6 @@
 namespace flexspline::worlds::machines {
 namespace {
 
-constexpr double kRate_hz = kControlRate_hz;
 constexpr double kWarmUp_s = 15.0;
 constexpr double kStress = 2.5;  // of the differences between records
 
@@ -20,7 +19,7 @@ bool is_cobot(Kind kind) {
 }
 
 std::size_t ticks(double seconds) {
-  return static_cast<std::size_t>(seconds * kRate_hz);
+  return static_cast<std::size_t>(seconds * kControlRate_hz);
 }
 
 // Of the bench's load machine: a brake, a weight on a rope, or a drive that follows a wave.
@@ -33,17 +32,17 @@ Signal bench_load(const Machine& m, const Inputs& in, double duration_s, Dice& d
     for (double& v : levels) v = dice.between(0.0, 1.0);
     Signal level(size);
     for (std::size_t k = 0; k < size; ++k)
-      level[k] = levels[static_cast<std::size_t>(static_cast<double>(k) / kRate_hz)];
+      level[k] = levels[static_cast<std::size_t>(static_cast<double>(k) / kControlRate_hz)];
     level = smoothed(level, ticks(0.3));
     for (std::size_t k = 0; k < size; ++k)
       level[k] *= amplitude * std::tanh(in.velocity_rad_s[k] / (0.02 * m.limits.velocity_rad_s));
     return level;
   }
   if (type == 1) return Signal(size, amplitude * dice.sign());
-  Signal torque = smoothed(coloured_noise(size, kRate_hz, 0.4, dice), ticks(0.3));
+  Signal torque = smoothed(coloured_noise(size, kControlRate_hz, 0.4, dice), ticks(0.3));
   const double rate = kTurn_rad * dice.between(0.05, 0.4), phase = dice.angle();
   for (std::size_t k = 0; k < size; ++k)
-    torque[k] = amplitude * (std::sin(rate * static_cast<double>(k) / kRate_hz + phase) + 0.3 * torque[k]);
+    torque[k] = amplitude * (std::sin(rate * static_cast<double>(k) / kControlRate_hz + phase) + 0.3 * torque[k]);
   return torque;
 }
 
@@ -51,7 +50,7 @@ void draw_load(const Machine& m, Inputs& in, double duration_s, Dice& dice) {
   const std::size_t size = in.angle_rad.size();
   in.output_torque_nm.assign(size, 0.0);
   if (m.human_torque_nm > 0.0) {
-    in.output_torque_nm = smoothed(coloured_noise(size, kRate_hz, 0.5, dice), ticks(0.3));
+    in.output_torque_nm = smoothed(coloured_noise(size, kControlRate_hz, 0.5, dice), ticks(0.3));
     for (double& v : in.output_torque_nm) v *= m.human_torque_nm;
   }
   if (m.bench_torque_nm > 0.0) in.output_torque_nm = bench_load(m, in, duration_s, dice);
@@ -65,7 +64,8 @@ void draw_load(const Machine& m, Inputs& in, double duration_s, Dice& dice) {
 void draw_samples(const Machine& m, Record& record, Dice& dice) {
   const Sensors& s = m.sensors;
   Inputs& in = record.inputs;
-  const auto size = static_cast<std::size_t>(static_cast<double>(in.angle_rad.size() - 2) / kRate_hz * s.sample_hz);
+  const auto size =
+      static_cast<std::size_t>(static_cast<double>(in.angle_rad.size() - 2) / kControlRate_hz * s.sample_hz);
   std::vector<double> even(size);
   for (std::size_t k = 0; k < size; ++k) {
     even[k] = (static_cast<double>(k) + 0.3) / s.sample_hz;
@@ -99,7 +99,7 @@ Record draw_record(const Machine& m, Motion motion, double start_temperature_c, 
   draw_load(m, in, duration_s, dice);
   const double rise_c = dice.between(0.1, 1.2);
   for (std::size_t k = 0; k < in.angle_rad.size(); ++k) {
-    const double time_s = static_cast<double>(k) / kRate_hz;
+    const double time_s = static_cast<double>(k) / kControlRate_hz;
     in.temperature_c.push_back(start_temperature_c + rise_c * (1.0 - std::exp(-time_s / kWarmUp_s)));
     in.encoder_noise.push_back(dice.normal());
   }

@@ -8,8 +8,6 @@
 namespace flexspline::worlds::machines {
 namespace {
 
-constexpr double kRate_hz = kControlRate_hz;
-
 double largest(const Signal& x) {
   double out = 0.0;
   for (const double v : x) out = std::max(out, std::abs(v));
@@ -24,8 +22,9 @@ Signal sweep(std::size_t size, double duration_s, const MotionLimits& m, Dice& d
   Signal angle(size);
   double phase = 0.0;
   for (std::size_t k = 0; k < size; ++k) {
-    const double rate = kTurn_rad * first * std::pow(last / first, static_cast<double>(k) / kRate_hz / duration_s);
-    phase += rate / kRate_hz;
+    const double rate =
+        kTurn_rad * first * std::pow(last / first, static_cast<double>(k) / kControlRate_hz / duration_s);
+    phase += rate / kControlRate_hz;
     const double amplitude = std::min({m.range_rad, m.velocity_rad_s / rate, m.acceleration_rad_s2 / (rate * rate)});
     angle[k] = amplitude * std::sin(phase);
   }
@@ -40,11 +39,11 @@ Signal fourier(std::size_t size, double duration_s, const MotionLimits& m, Dice&
   for (int h = 1; h < 6; ++h) {
     const double sine = dice.normal() / h, cosine = dice.normal() / h;
     for (std::size_t k = 0; k < size; ++k) {
-      const double phase = kTurn_rad * first * h * static_cast<double>(k) / kRate_hz;
+      const double phase = kTurn_rad * first * h * static_cast<double>(k) / kControlRate_hz;
       angle[k] += sine * std::sin(phase) + cosine * (std::cos(phase) - 1.0);
     }
   }
-  const Signal velocity = derivative(angle, kRate_hz), acceleration = derivative(velocity, kRate_hz);
+  const Signal velocity = derivative(angle, kControlRate_hz), acceleration = derivative(velocity, kControlRate_hz);
   const double excess = std::max({largest(velocity) / m.velocity_rad_s, largest(acceleration) / m.acceleration_rad_s2,
                                   largest(angle) / m.range_rad});
   for (double& v : angle) v /= excess;
@@ -65,16 +64,16 @@ std::size_t put_stroke(Stroke s, std::size_t at, Signal& velocity, double& posit
     ramp_s = s.velocity_rad_s / s.acceleration_rad_s2;
   }
   const double total_s = distance / std::max(s.velocity_rad_s, 1e-9) + ramp_s;
-  const auto ticks = static_cast<std::size_t>(total_s * kRate_hz);
+  const auto ticks = static_cast<std::size_t>(total_s * kControlRate_hz);
   if (ticks < 4) return 4;
-  if (at + ticks + static_cast<std::size_t>(0.2 * kRate_hz) >= velocity.size()) return 0;
+  if (at + ticks + static_cast<std::size_t>(0.2 * kControlRate_hz) >= velocity.size()) return 0;
   for (std::size_t k = 0; k < ticks; ++k) {
-    const double t = static_cast<double>(k) / kRate_hz;
+    const double t = static_cast<double>(k) / kControlRate_hz;
     const double part = std::min({t / ramp_s, 1.0, std::max((total_s - t) / ramp_s, 0.0)});
     velocity[at + k] = std::copysign(part * s.velocity_rad_s, s.distance_rad);
-    position += velocity[at + k] / kRate_hz;
+    position += velocity[at + k] / kControlRate_hz;
   }
-  return ticks + static_cast<std::size_t>(s.dwell_s * kRate_hz);
+  return ticks + static_cast<std::size_t>(s.dwell_s * kControlRate_hz);
 }
 
 // Strokes between two ends, at six speeds in turn; or to drawn points.
@@ -85,8 +84,8 @@ Signal strokes(std::size_t size, double duration_s, const MotionLimits& m, bool 
   dice.shuffle(speeds);
   Signal velocity(size, 0.0);
   double position = 0.0, side = 1.0;
-  auto at = static_cast<std::size_t>(0.3 * kRate_hz);
-  for (std::size_t k = 0; at + static_cast<std::size_t>(0.5 * kRate_hz) < size; ++k) {
+  auto at = static_cast<std::size_t>(0.3 * kControlRate_hz);
+  for (std::size_t k = 0; at + static_cast<std::size_t>(0.5 * kControlRate_hz) < size; ++k) {
     Stroke s{};
     if (between_ends) {
       s = {side * end - position, speeds[(k / 2) % 6], 0.8 * m.acceleration_rad_s2, dice.between(0.05, 0.4)};
@@ -104,7 +103,7 @@ Signal strokes(std::size_t size, double duration_s, const MotionLimits& m, bool 
     if (ticks == 0) break;
     at += ticks;
   }
-  return smoothed(velocity, static_cast<std::size_t>(0.4 * kRate_hz * m.velocity_rad_s / m.acceleration_rad_s2));
+  return smoothed(velocity, static_cast<std::size_t>(0.4 * kControlRate_hz * m.velocity_rad_s / m.acceleration_rad_s2));
 }
 
 }  // namespace
@@ -124,22 +123,22 @@ std::string_view name_of(Motion motion) {
 }
 
 Reference draw_reference(Motion motion, double duration_s, const MotionLimits& limits, Dice& dice) {
-  const auto size = static_cast<std::size_t>(duration_s * kRate_hz);
+  const auto size = static_cast<std::size_t>(duration_s * kControlRate_hz);
   Reference r;
   if (motion == Motion::sweep || motion == Motion::fourier) {
     r.angle_rad =
         motion == Motion::sweep ? sweep(size, duration_s, limits, dice) : fourier(size, duration_s, limits, dice);
     for (std::size_t k = 0; k < size; ++k) {
-      const double t = std::min(1.0, static_cast<double>(k) / kRate_hz / (0.04 * duration_s));
+      const double t = std::min(1.0, static_cast<double>(k) / kControlRate_hz / (0.04 * duration_s));
       r.angle_rad[k] *= 0.5 - 0.5 * std::cos(0.5 * kTurn_rad * t);
     }
   } else {
     const Signal velocity = strokes(size, duration_s, limits, motion == Motion::trapezoids, dice);
     double angle = 0.0;
-    for (const double w : velocity) r.angle_rad.push_back(angle += w / kRate_hz);
+    for (const double w : velocity) r.angle_rad.push_back(angle += w / kControlRate_hz);
   }
-  r.velocity_rad_s = derivative(r.angle_rad, kRate_hz);
-  r.acceleration_rad_s2 = smoothed(derivative(r.velocity_rad_s, kRate_hz), 8);
+  r.velocity_rad_s = derivative(r.angle_rad, kControlRate_hz);
+  r.acceleration_rad_s2 = smoothed(derivative(r.velocity_rad_s, kControlRate_hz), 8);
   return r;
 }
 

@@ -78,6 +78,11 @@ Signal coloured_noise(std::size_t size, double rate_hz, double corner_hz, Dice& 
   return out;
 }
 
+Signal scaled(Signal x, double factor) {
+  for (double& v : x) v *= factor;
+  return x;
+}
+
 double rms(const Signal& x) {
   const double squares = std::inner_product(x.begin(), x.end(), x.begin(), 0.0);
   return x.empty() ? 0.0 : std::sqrt(squares / static_cast<double>(x.size()));

@@ -26,6 +26,7 @@ class ZeroPhaseLowPass {
 };
 // First-order autoregressive noise of unit variance.
 Signal coloured_noise(std::size_t size, double rate_hz, double corner_hz, Dice& dice);
+Signal scaled(Signal x, double factor);
 double rms(const Signal& x);
 double standard_deviation(const Signal& x);
 // RMS of what least squares on the columns leave of the target.
