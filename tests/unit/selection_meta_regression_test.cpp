@@ -1,4 +1,4 @@
-// Meta-regression over records against closed forms: ordinary least squares, enumerated permutations, the likelihood.
+// Meta-regression over records against closed forms: ordinary least squares, the likelihood.
 #include "host/engine/selection/meta_regression.hpp"
 
 #include <gtest/gtest.h>
@@ -11,30 +11,15 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/records_with_law.hpp"
+
 namespace flexspline::selection::selection_meta_regression_test {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-
-// Parameters without errors of their own.
-RecordParameters exact(const MatrixXd& theta) {
-  return {theta, MatrixXd::Zero(theta.rows(), theta.cols())};
-}
-
-struct Records {
-  MatrixXd theta, added;
-  Records(Index records, double coefficient, unsigned seed) : theta(records, 2), added(records, 2) {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal;
-    for (Index i = 0; i < records; ++i) {
-      const double speed = 1.0 + 0.1 * static_cast<double>(i);
-      added.row(i) << 0.5 / std::sqrt(speed), std::sqrt(speed);
-      theta.row(i) << 2.0 + coefficient * added(i, 0) + 0.05 * normal(random),
-          7.0 + coefficient * added(i, 1) + 0.3 * normal(random);
-    }
-  }
-};
+using tests::exact;
+using tests::RecordsWithLaw;
 
 double deviance(const MatrixXd& theta, const MatrixXd& added, double coefficient) {
   double sum = 0.0;
@@ -75,7 +60,7 @@ TEST(MetaRegression, TIsNoLargerThanTheErrorsOfTheRecordsAllow) {
 }
 
 TEST(MetaRegression, OfTwoParametersHasTheGreatestLikelihood) {
-  const Records r(20, 1.5, 3);
+  const RecordsWithLaw r(20, 1.5, 3);
   const MetaRegression fit = meta_regression(exact(r.theta), r.added);
   EXPECT_NEAR(fit.coefficient, 1.5, 4.0 * fit.coefficient_std);
   const double best = deviance(r.theta, r.added, fit.coefficient);
@@ -85,7 +70,7 @@ TEST(MetaRegression, OfTwoParametersHasTheGreatestLikelihood) {
 }
 
 TEST(MetaRegression, WeighsARecordByItsOwnErrorAndWhatDiffersBetweenThem) {
-  const Records r(15, 1.0, 11);
+  const RecordsWithLaw r(15, 1.0, 11);
   RecordParameters records = exact(r.theta);
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
@@ -118,7 +103,7 @@ TEST(MetaRegression, WeighsARecordByItsOwnErrorAndWhatDiffersBetweenThem) {
 }
 
 TEST(MetaRegression, CountsARecordWithWhatItIdentifies) {
-  const Records r(18, 1.2, 21);
+  const RecordsWithLaw r(18, 1.2, 21);
   RecordParameters records = exact(r.theta);
   const double unknown = std::numeric_limits<double>::infinity();
   for (const Index i : {0, 1, 2, 3, 16}) records.variance(i, 0) = unknown;
@@ -162,65 +147,15 @@ TEST(MetaRegression, IsPossibleOnlyWithTheSignOfFriction) {
 }
 
 TEST(MetaRegression, OfAnEffectThatIsAlikeInAllRecordsExplainsNothing) {
-  Records r(8, 0.0, 5);
+  RecordsWithLaw r(8, 0.0, 5);
   r.added.setConstant(2.0);
   const MetaRegression fit = meta_regression(exact(r.theta), r.added);
   EXPECT_NEAR(fit.likelihood_ratio, 0.0, 1e-9);
   EXPECT_FALSE(is_possible(fit));
 }
 
-TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
-  const Records r(6, 0.4, 7);
-  const auto ratio = [&](const MatrixXd& added) {
-    const MetaRegression fit = meta_regression(exact(r.theta), added);
-    return is_possible(fit) ? fit.likelihood_ratio : 0.0;
-  };
-  const double recorded = ratio(r.added);
-  ASSERT_GT(recorded, 0.0);
-  std::vector<Index> order(6);
-  std::iota(order.begin(), order.end(), Index{0});
-  int reached = 0, all = 0;
-  do {
-    reached += ratio(r.added(order, Eigen::all)) >= recorded;
-    ++all;
-  } while (std::next_permutation(order.begin(), order.end()));
-  const double of_all = static_cast<double>(reached) / all;
-  // Drawing ends after twenty permutations that reach it, so the share is known to one over the root of twenty.
-  double mean = 0.0;
-  constexpr int kSeeds = 40;
-  for (unsigned seed = 0; seed < kSeeds; ++seed)
-    mean += permutation_p_value(exact(r.theta), {r.added}, {whole_of(exact(r.theta))}, 20000, seed) / kSeeds;
-  EXPECT_NEAR(mean, of_all, 4.0 * of_all / std::sqrt(20.0 * kSeeds) + of_all / 20.0);
-}
-
-TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
-  int found = 0, wrong = 0;
-  for (unsigned seed = 0; seed < 100; ++seed) {
-    const Records with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
-    found += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 1000, seed) <= 0.01;
-    wrong += permutation_p_value(exact(without.theta), {without.added}, {whole_of(exact(without.theta))}, 1000, seed) <=
-             0.05;
-  }
-  EXPECT_GT(found, 90);
-  EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs
-}
-
-TEST(PermutationTest, CountsHowManyLawsAreTried) {
-  // The best of many laws that have nothing to do with the records is no better than a permutation of them.
-  int significant = 0;
-  for (unsigned seed = 0; seed < 40; ++seed) {
-    const Records r(12, 0.0, 2000 + seed);
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal;
-    std::vector<MatrixXd> laws;
-    for (int k = 0; k < 20; ++k) laws.push_back(MatrixXd::NullaryExpr(12, 2, [&] { return normal(random); }));
-    significant += permutation_p_value(exact(r.theta), laws, {whole_of(exact(r.theta))}, 400, seed) <= 0.1;
-  }
-  EXPECT_LT(significant, 10);  // 4 are expected
-}
-
-// Records of a slow and of a fast kind, which do not identify the same parameters.
-RecordParameters two_kinds(const Records& r, Index slow) {
+// RecordsWithLaw of a slow and of a fast kind, which do not identify the same parameters.
+RecordParameters two_kinds(const RecordsWithLaw& r, Index slow) {
   RecordParameters records = exact(r.theta);
   records.variance.topLeftCorner(slow, 1).setConstant(std::numeric_limits<double>::infinity());
   return records;
@@ -230,7 +165,7 @@ TEST(PermutationTest, OfRecordsThatIdentifyDifferentParametersIsSeldomWrong) {
   int wrong = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     // The slow kind has other friction, for a reason that is no law of speed; within a kind there is none.
-    Records r(24, 0.0, 3000 + seed);
+    RecordsWithLaw r(24, 0.0, 3000 + seed);
     r.theta.topRows(10).col(1).array() += 2.0;
     const RecordParameters records = two_kinds(r, 10);
     wrong += permutation_p_value(records, {r.added}, {whole_of(records)}, 400, seed) <= 0.05;
@@ -238,30 +173,8 @@ TEST(PermutationTest, OfRecordsThatIdentifyDifferentParametersIsSeldomWrong) {
   EXPECT_LT(wrong, 11);  // 5 are expected
 }
 
-TEST(PermutationTest, FindsALawThatHoldsForTheFasterRecordsOnly) {
-  int found = 0, of_all = 0, wrong = 0;
-  for (unsigned seed = 0; seed < 30; ++seed) {
-    Records with(40, 1.5, seed);
-    const Records without(40, 0.0, 1000 + seed);
-    // The slow half has the friction of the fastest, which the law contradicts.
-    with.theta.topRows(16) = without.theta.topRows(16);
-    with.theta.topRows(16).rowwise() += 1.5 * with.added.row(39);
-    std::vector<Part> parts;
-    for (Index first = 0; first < 34; first += 4) {
-      parts.push_back({{}, {0, 1}});
-      for (Index i = first; i < 40; ++i) parts.back().records.push_back(i);
-    }
-    found += permutation_p_value(exact(with.theta), {with.added}, parts, 400, seed) <= 0.05;
-    of_all += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 400, seed) <= 0.05;
-    wrong += permutation_p_value(exact(without.theta), {without.added}, parts, 400, seed) <= 0.05;
-  }
-  EXPECT_GT(found, 25);
-  EXPECT_LT(of_all, 5);
-  EXPECT_LT(wrong, 6);  // 1.5 are expected
-}
-
 TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
-  const Records r(10, 1.0, 9);
+  const RecordsWithLaw r(10, 1.0, 9);
   EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, {whole_of(exact(r.theta))}, 100, 1), 1.0);
 }
 

@@ -8,7 +8,7 @@
 
 #include "host/engine/estimation/terms.hpp"
 
-namespace flexspline::selection::selection_encoder_errors_test {
+namespace flexspline::selection::encoder_errors_test {
 namespace {
 
 using data::Column;
@@ -115,4 +115,4 @@ TEST(CheckEncoderErrors, ALoopLargerThanTheStepsStays) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection::selection_encoder_errors_test
+}  // namespace flexspline::selection::encoder_errors_test
