@@ -10,7 +10,7 @@
 
 namespace flexspline::data {
 
-// A kind of finding, as documented in README.md in this folder.
+// A kind of finding, FINDINGS.md in this folder lists them.
 struct KindInfo {
   std::string_view name;
   Severity severity = Severity::warning;  // without `--tolerate`
