@@ -29,6 +29,8 @@ namespace fs = std::filesystem;
 using Violations = std::vector<std::string>;
 
 constexpr long kMaxLines = 500;
+// Folders of tests/ whose files are compiled together (tests/CMakeLists.txt).
+const std::set<std::string> kTogether = {"unit", "cli", "campaign", "report"};
 
 const std::map<std::string, std::set<std::string>, std::less<>> kMayInclude = {
     {"shared", {"shared"}},
@@ -229,6 +231,21 @@ Violations too_long(const std::vector<SourceFile>& files) {
   return found;
 }
 
+// Tests of a folder are compiled together, so that what two of them call alike would be defined twice.
+Violations tests_without_own_namespace(const std::vector<SourceFile>& files) {
+  Violations found;
+  for (const SourceFile& file : files) {
+    const fs::path path(file.path);
+    const std::string stem = path.stem().string();
+    const bool is_together = path.begin() != path.end() && *path.begin() == "tests" &&
+                             ends_with_any(file.path, {"_test.cpp"}) &&
+                             kTogether.contains(path.parent_path().filename().string());
+    if (is_together && file.text.find("::" + stem + " {\n") == std::string::npos)
+      found.push_back(file.path + " has no namespace of its own: open it with `namespace flexspline::" + stem + " {`");
+  }
+  return found;
+}
+
 Violations developer_paths(const std::vector<SourceFile>& files) {
   // Put together here, so that this file does not break its own rule.
   static const std::array<std::string, 2> kPlaces = {std::string("/") + "work/", std::string("/") + "home/"};
@@ -301,6 +318,9 @@ TEST(Architecture, HeavyHeadersStandInOneFileOfAFolder) {
 }
 TEST(Architecture, NoSourceFileOutgrowsAHead) {
   EXPECT_NO_VIOLATION(too_long(project_files()));
+}
+TEST(Architecture, EachTestFileHasANamespaceOfItsOwn) {
+  EXPECT_NO_VIOLATION(tests_without_own_namespace(project_files()));
 }
 TEST(Architecture, NoFileNamesADeveloperMachine) {
   EXPECT_NO_VIOLATION(developer_paths(project_files()));
@@ -387,6 +407,13 @@ TEST(ArchitectureRules, LongFilesAreFound) {
   const auto with_lines = [](long n) { return std::string(static_cast<std::size_t>(n), '\n'); };
   EXPECT_NO_VIOLATION(too_long({{"host/a.cpp", with_lines(kMaxLines)}, {"tests/data.csv", with_lines(kMaxLines + 1)}}));
   EXPECT_EQ(too_long({{"host/a.cpp", with_lines(kMaxLines + 1)}, {"dev", with_lines(kMaxLines + 1)}}).size(), 2u);
+}
+
+TEST(ArchitectureRules, ATestFileWithoutANamespaceOfItsOwnIsFound) {
+  EXPECT_EQ(tests_without_own_namespace({{"tests/unit/a_test.cpp", "namespace flexspline::b {\n"}}).size(), 1u);
+  EXPECT_EQ(tests_without_own_namespace({{"tests/unit/a_test.cpp", "namespace {\n"}}).size(), 1u);
+  EXPECT_NO_VIOLATION(tests_without_own_namespace({{"tests/unit/a_test.cpp", "namespace flexspline::b::a_test {\n"}}));
+  EXPECT_NO_VIOLATION(tests_without_own_namespace({{"tests/board/a_test.cpp", "namespace {\n"}}));
 }
 
 TEST(ArchitectureRules, PathsOfADeveloperMachineAreFound) {
