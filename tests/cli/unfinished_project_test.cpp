@@ -55,6 +55,30 @@ TEST(UnfinishedProject, MessagesNameLinesOfTheFileThatIsThere) {
   EXPECT_TRUE(contains(line, "columns.motor_position_rad")) << number << " " << shell.file("project/dataset.toml");
 }
 
+TEST(UnfinishedProject, CountsATurnAreAskedForByTheirOption) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_s,i_q,theta_counts"));
+  const Answer answer = shell.run("flexspline new --from log.csv --out project");
+  EXPECT_EQ(answer.code, 2);
+  // The q of a current is an axis of the field, and no angle of the link.
+  EXPECT_FALSE(contains(shell.file("project/dataset.toml"), "of the output")) << shell.file("project/dataset.toml");
+  const std::string line = line_to_go_on_with(answer.err), wanted = " --encoder-counts NUMBER";
+  ASSERT_TRUE(contains(line, wanted)) << answer.err;
+  shell.must(line.substr(0, line.find(wanted)) + " --encoder-counts 4");
+  EXPECT_TRUE(contains(shell.file("project/dataset.toml"), "encoder_counts = 4")) << shell.file("project/dataset.toml");
+}
+
+TEST(UnfinishedProject, ATorqueThatHasTheNameOfTheSensorsMayBeTheMotors) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_s,torque_nm,motor_position_rad"));
+  const Answer answer = shell.run("flexspline new --from log.csv --out project");
+  EXPECT_EQ(answer.code, 2);
+  const std::string line = line_to_go_on_with(answer.err);
+  EXPECT_TRUE(contains(line, " --map motor_torque_nm=torque_nm")) << answer.err;
+  shell.must(line);
+  EXPECT_TRUE(contains(shell.file("project/base-model.toml"), "inertia"));
+}
+
 TEST(UnfinishedProject, WhatCanBeToleratedStandsInTheLine) {
   const Shell shell;
   shell.write("log.csv", log_of("time_s,current_a,motor_position_rad") + "2.000,nan,1.0\n2.001,0,1\n");

@@ -56,6 +56,16 @@ TEST(Csv, SeparatorsLineEndsAndDecimalCommasAllReadTheSame) {
   }()));
 }
 
+// Settings may be pairs of a name and a number, or words between blanks: neither is a header with a line of data.
+TEST(Csv, SettingsBeforeTheNamesArePassedOver) {
+  const TestFolder folder;
+  for (const std::string settings : {"Drive log v2\nSerial: 1234\n\n", "Title,Scope 1\nRate,1000\nGain,2\n",
+                                     "Rate,1000\nStart,2026-03-01 10:00\n\n", "Recorder\n"}) {
+    expect_ramp(folder.write("run.csv", settings + rows("time_s,current_a", ",", false, "\n")));
+    expect_ramp(folder.write("run.csv", settings + rows("time_s\tcurrent_a", "\t", false, "\n")));
+  }
+}
+
 TEST(Csv, QuotedTextInAnUnknownColumnMayHoldSeparators) {
   const TestFolder folder;
   std::string text = "state,time_s,\"current_a\"\n";

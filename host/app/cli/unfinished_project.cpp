@@ -61,10 +61,16 @@ std::string missing_maps(const project::Draft& draft) {
     });
   };
   std::vector<std::string> missing;
-  if (!there({"time_s"})) missing.emplace_back("time_s");
-  if (!there({"current_a", "motor_torque_nm"})) missing.emplace_back("current_a");
-  if (!there({"motor_position_rad", "motor_velocity_rad_s"})) missing.emplace_back("motor_position_rad");
   std::string line;
+  if (!there({"time_s"})) missing.emplace_back("time_s");
+  // "torque_nm" is the torque sensor's by its name, but many drives call their motor's torque so.
+  if (!there({"current_a", "motor_torque_nm"})) {
+    if (there({"torque_nm"}) && !draft.toml.columns.contains("torque_nm"))
+      line += " --map motor_torque_nm=torque_nm";
+    else
+      missing.emplace_back("current_a");
+  }
+  if (!there({"motor_position_rad", "motor_velocity_rad_s"})) missing.emplace_back("motor_position_rad");
   std::vector<std::string> left = draft.unused;
   for (const std::string& ours : missing) {
     std::string theirs = "NAME";
@@ -91,6 +97,14 @@ std::string tolerations(const std::vector<data::Finding>& errors) {
   return line;
 }
 
+// A number of counts a turn, where a position in counts needs it.
+std::string missing_counts(const std::vector<data::Finding>& errors) {
+  const bool is_missing = std::any_of(errors.begin(), errors.end(), [](const data::Finding& error) {
+    return error.remedy.find("write encoder_counts ") != std::string::npos;
+  });
+  return is_missing ? " --encoder-counts NUMBER" : "";
+}
+
 }  // namespace
 
 bool is_unfinished(const fs::path& dataset_toml) {
@@ -109,10 +123,10 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   const std::vector<data::Finding> errors = errors_of(why);
   for (const data::Finding& error : errors) console.error(error.text());
   if (errors.empty()) console.error(why.what());
-  std::string line = as_given(request) + missing_maps(draft) + tolerations(errors);
+  std::string line = as_given(request) + missing_maps(draft) + missing_counts(errors) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side link";
   console.error(
-      fmt::format("{} holds what could be found; replace NAME, or a wrong name, by the right one "
+      fmt::format("{} holds what could be found; replace NAME, NUMBER or a wrong name by the right one "
                   "(NAME:UNIT states its unit), and continue with\n  {}",
                   file.string(), line));
 }

@@ -123,13 +123,21 @@ bool is_joint_torque(const std::vector<std::string>& words) {
   return words == std::vector<std::string>{"tau", "j"};
 }
 
+// "i_q": the letter is an axis of the motor's field, and no angle.
+bool is_current_of_axis_q(const std::vector<std::string>& words) {
+  return has_any(words, {"q"}) && has_any(words, {"i", "current", "cur", "strom"});
+}
+
 // Such texts call the motor's angle theta and the link's q: where both are there, they say which side a column is of.
 Side side_by_joint_symbols(const std::vector<std::string>& words, const std::vector<std::string>& names) {
   if (is_joint_torque(words)) return Side::link;
   const auto is_there = [&](const char* symbol) {
-    return std::any_of(names.begin(), names.end(),
-                       [&](const std::string& name) { return has_any(words_of(without_index(name)), {symbol}); });
+    return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+      const std::vector<std::string> theirs = words_of(without_index(name));
+      return has_any(theirs, {symbol}) && !is_current_of_axis_q(theirs);
+    });
   };
+  if (is_current_of_axis_q(words)) return Side::open;
   if (!is_there("theta") || !is_there("q")) return Side::open;
   return has_any(words, {"theta", "dtheta"}) ? Side::motor : has_any(words, {"q", "dq"}) ? Side::link : Side::open;
 }

@@ -79,8 +79,6 @@ class HeaderReader {
         comment(trimmed(line.text.substr(1)), number, rows.empty());
       else
         rows.push_back(row_of(line, number, begin));
-      // A header whose line fits is the usual case; there is no need to look on.
-      if (rows.size() == 3 && fits(rows[0], rows[1])) break;
     }
     return rows;
   }
@@ -108,23 +106,16 @@ class HeaderReader {
     return std::nullopt;
   }
 
-  // Column names of the contract are names, whatever is under them; others are names where numbers or units are under
-  // them.
-  static bool fits(const Row& names, const Row& under) {
-    const bool ours = std::any_of(names.fields.begin(), names.fields.end(), [](std::string_view field) {
-      return field == "time_s" || column_from_name(field).has_value();
-    });
-    if (ours) return true;
-    return names.fields.size() >= 2 && names.separator == under.separator &&
-           names.fields.size() >= under.fields.size() &&
-           names.fields.size() <= under.fields.size() + under.fields.size() / 2 + 1 &&
-           (under.numbers() > 0 || is_units(under, names.fields.size()));
+  // Column names of the contract are names, whatever is under them.
+  static bool are_ours(const Row& names) {
+    return std::any_of(names.fields.begin(), names.fields.end(),
+                       [](std::string_view field) { return field == "time_s" || column_from_name(field).has_value(); });
   }
 
   // The first line, unless the logger wrote lines of its own there: then the last line of names before the numbers
   // begin.
   static std::size_t row_of_names(const std::vector<Row>& rows) {
-    if (rows.size() < 2 || fits(rows[0], rows[1])) return 0;
+    if (rows.size() < 2 || are_ours(rows[0])) return 0;
     for (std::size_t k = 1; k < rows.size(); ++k) {
       const Row& numbers = rows[k];
       if (numbers.fields.size() < 2 || numbers.numbers() + numbers.empty() < numbers.fields.size()) continue;
