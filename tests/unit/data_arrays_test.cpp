@@ -77,6 +77,10 @@ TEST(ArrayFiles, FormatsWithoutALibraryNameTheLineThatConvertsThem) {
   ASSERT_EQ(errors.size(), 1u);
   EXPECT_NE(errors[0].text().find("Parquet"), std::string::npos);
   EXPECT_NE(errors[0].text().find("run.csv"), std::string::npos) << errors[0].text();
+  const std::vector<Finding> of_json =
+      errors_of({folder.write("run.jsonl", "{\"t\": 0, \"q\": 1}\n{\"t\": 1, \"q\": 2}\n")});
+  ASSERT_EQ(of_json.size(), 1u);
+  EXPECT_NE(of_json[0].text().find("lines=True"), std::string::npos) << of_json[0].text();
 }
 
 TEST(ArrayFiles, NamesOfElementsOfAStructArray) {

@@ -63,6 +63,8 @@ TEST(Csv, SettingsBeforeTheNamesArePassedOver) {
                                      "Rate,1000\nStart,2026-03-01 10:00\n\n", "Recorder\n"}) {
     expect_ramp(folder.write("run.csv", settings + rows("time_s,current_a", ",", false, "\n")));
     expect_ramp(folder.write("run.csv", settings + rows("time_s\tcurrent_a", "\t", false, "\n")));
+    // The name of a state between the numbers.
+    expect_ramp(folder.write("run.csv", settings + rows("time_s;state;current_a", ";RUN;", false, "\n")));
   }
 }
 

@@ -112,13 +112,27 @@ class HeaderReader {
                        [](std::string_view field) { return field == "time_s" || column_from_name(field).has_value(); });
   }
 
+  static bool is_of_numbers(const Row& row) {
+    return row.fields.size() >= 2 && row.numbers() + row.empty() == row.fields.size();
+  }
+
+  // Two lines of data with text among them, as a state's name. Both begin with a number, as no pair of a setting's name
+  // and its value does.
+  static bool are_of_numbers_and_text(const Row& one, const Row& next) {
+    const auto begins_with_number = [](const Row& row) {
+      return row.fields.size() >= 2 && is_number(row.fields.front(), row.separator);
+    };
+    return begins_with_number(one) && begins_with_number(next) && one.fields.size() == next.fields.size() &&
+           2 * one.numbers() >= one.fields.size();
+  }
+
   // The first line, unless the logger wrote lines of its own there: then the last line of names before the numbers
   // begin.
   static std::size_t row_of_names(const std::vector<Row>& rows) {
     if (rows.size() < 2 || are_ours(rows[0])) return 0;
     for (std::size_t k = 1; k < rows.size(); ++k) {
       const Row& numbers = rows[k];
-      if (numbers.fields.size() < 2 || numbers.numbers() + numbers.empty() < numbers.fields.size()) continue;
+      if (!is_of_numbers(numbers) && !(k + 1 < rows.size() && are_of_numbers_and_text(numbers, rows[k + 1]))) continue;
       if (const auto scope = row_of_channels(rows, k)) return *scope;
       for (std::size_t back = k; back > 0; --back) {
         const Row& names = rows[back - 1];

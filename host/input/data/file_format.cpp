@@ -56,6 +56,10 @@ constexpr auto kForeign = std::to_array<Foreign>({
      "7zXZ"sv,
      "a file compressed by xz", "run unxz {0}"},
     {"\xD0\xCF\x11\xE0"sv, "a workbook of Excel", "save its sheet as CSV"},
+    {"{\""sv, "a file of JSON lines",
+     "run python3 -c \"import pandas; pandas.read_json('{0}', lines=True).to_csv('{1}.csv', index=False)\""},
+    {"[{\""sv, "a file of JSON",
+     "run python3 -c \"import pandas; pandas.read_json('{0}').to_csv('{1}.csv', index=False)\""},
 });
 
 const Foreign* foreign_of(std::string_view head) {
