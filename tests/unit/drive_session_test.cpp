@@ -7,6 +7,7 @@
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
 #include "host/drive_link/drive/recorder.hpp"
+#include "host/drive_link/drive/silence.hpp"
 #include "tests/support/loopback.hpp"
 
 namespace flexspline::drive::drive_session_test {
@@ -161,6 +162,27 @@ TEST(Recorder, AVelocityBeyondThePlansLimitEndsTheRun) {
   plan.runs[0].duration_s = run.duration_s = 1.0;
   const Recording guarded = Recorder(session, scales, plan).record(run, {});
   EXPECT_TRUE(guarded.complete) << guarded.ended;
+}
+
+TEST(DriveSilence, IsCountedWhileTheHostListensAndNotWhileItStandsStill) {
+  using std::chrono::milliseconds;
+  Silence::Clock::time_point now;
+  Silence silence(milliseconds(100), now);
+  const auto wait = [&](milliseconds took, bool heard) { silence.waited(milliseconds(5), heard, now += took); };
+  for (int k = 0; k < 20; ++k) wait(milliseconds(5), false);
+  EXPECT_FALSE(silence.is_too_long()) << "100 ms are not more than 100 ms";
+  wait(milliseconds(5), false);
+  EXPECT_TRUE(silence.is_too_long());
+  wait(milliseconds(1), true);
+  EXPECT_FALSE(silence.is_too_long());
+  // Stopped for an hour within one wait.
+  wait(std::chrono::hours(1), false);
+  EXPECT_FALSE(silence.is_too_long());
+  // Waits that end early, as on a line with noise, count as long as they take.
+  for (int k = 0; k < 80; ++k) wait(milliseconds(1), false);
+  EXPECT_FALSE(silence.is_too_long());
+  for (int k = 0; k < 20; ++k) wait(milliseconds(1), false);
+  EXPECT_TRUE(silence.is_too_long());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "host/app/cli/drive_commands.hpp"
 #include "host/common/text/nearest.hpp"
 #include "host/drive_link/drive/scales.hpp"
+#include "host/drive_link/drive/silence.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 #include "shared/protocol/texts.hpp"
@@ -147,17 +148,17 @@ class Monitor {
     for (const Channel c : channels_) subscribed.push_back(c);
     session_.subscribe(subscribed, every_);
     const auto begin = Clock::now();
-    auto heard_at = begin;
+    constexpr transport::Milliseconds kWait{20}, kSilence{3000};
+    drive::Silence silence(kSilence, begin);
     while (!Interruptible::interrupted()) {
       const auto now = Clock::now();
       if (options_.seconds > 0.0 && std::chrono::duration<double>(now - begin).count() >= options_.seconds) break;
-      const auto m = session_.next(transport::Milliseconds(20));
-      if (m) heard_at = now;
+      const auto m = session_.next(kWait);
+      silence.waited(kWait, m.has_value(), drive::Silence::Clock::now());
       if (m && m->is_unasked())
         protocol::for_each_frame(*m, [this](const auto& head, auto i, auto words) { take(head, i, words); });
       if (asks_reason_) ask_reason();
-      if (now - heard_at > std::chrono::seconds(3))
-        session_.fail("the drive went silent; check cable and power, then try again");
+      if (silence.is_too_long()) session_.fail("the drive went silent; check cable and power, then try again");
     }
     session_.subscribe({}, 1);
     if (lost_ > 0) console_.warn(fmt::format("{} frames were lost", lost_));

@@ -8,6 +8,7 @@
 #include <optional>
 #include <thread>
 
+#include "host/drive_link/drive/silence.hpp"
 #include "host/engine/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/overflow_log.hpp"
@@ -28,6 +29,7 @@ constexpr double kHeartbeatTick_s = 0.02;
 // Set points of position go out more often.
 constexpr Milliseconds kSetPoint{5};
 constexpr double kSetPoint_s = 0.005;
+constexpr Milliseconds kWait{5};  // for a message
 constexpr Milliseconds kSilence{2000};
 constexpr double kStart_s = 2.0;  // until a run of mode position has begun
 constexpr double kOver = 1.1;     // of a limit: noise is no reason to stop
@@ -270,17 +272,18 @@ class Recorder::Exchange {
   // Until the run is over, a limit is exceeded, the user stops it or the drive leaves its mode.
   void follow(protocol::Mode mode) {
     mode_ = mode;
-    reported_at_ = received_at_ = Clock::now();
+    reported_at_ = Clock::now();
+    Silence silence(kSilence, reported_at_);
     while (true) {
-      const auto m = session_.next(Milliseconds(5));
+      const auto m = session_.next(kWait);
       now_ = Clock::now();
-      if (m) received_at_ = now_;
+      silence.waited(kWait, m.has_value(), now_);
       if (m && m->is_unasked())
         take_frames(*m);
       else if (m && has_left_mode(*m))
         return;
       if (is_over()) return;
-      if (now_ - received_at_ > kSilence) session_.fail("the drive went silent; check cable and power");
+      if (silence.is_too_long()) session_.fail("the drive went silent; check cable and power");
       if (is_due()) report();
     }
   }
@@ -350,7 +353,7 @@ class Recorder::Exchange {
   Recording& out_;
   const Watch& watch_;
   protocol::Mode mode_ = protocol::Mode::idle;
-  Clock::time_point now_, reported_at_, received_at_;
+  Clock::time_point now_, reported_at_;
   std::uint32_t report_ticks_ = 0, reported_tick_ = 0;
   std::optional<double> began_s_;  // of position
   bool waits_ = false;
