@@ -202,12 +202,12 @@ TEST(BootSignature, TheEquationIsTheOneWithoutCofactorAsInLibsodium) {
   EXPECT_LT(accepted, 24);
 }
 
-TEST(BootSignature, LibsodiumJudgesThreeHundredSignaturesAsTheDriveDoes) {
-  const Agreement agreement = agreement_with_libsodium(336, 1);
+TEST(BootSignature, LibsodiumJudgesAThousandSignaturesAsTheDriveDoes) {
+  const Agreement agreement = agreement_with_libsodium(1008, 1);
   EXPECT_EQ(agreement.differ, std::vector<std::string>{});
   EXPECT_EQ(agreement.by_kind.size(), 16U);
-  EXPECT_EQ(agreement.by_kind.at("good"), (std::array<std::size_t, 2>{21, 0}));
-  EXPECT_EQ(agreement.by_kind.at("S + L"), (std::array<std::size_t, 2>{0, 21}));
+  EXPECT_EQ(agreement.by_kind.at("good"), (std::array<std::size_t, 2>{63, 0}));
+  EXPECT_EQ(agreement.by_kind.at("S + L"), (std::array<std::size_t, 2>{0, 63}));
 }
 
 // Arithmetic of the field where carries are rare: next to zero, p and 2^256.
