@@ -296,9 +296,10 @@ TEST_F(WorkbenchApi, RunsTheClosedLoopWithoutCompensationWithTheModelAsOpenedAnd
 
 TEST_F(WorkbenchApi, AClosedLoopThatIsCancelledMidwayLeavesNothingBehind) {
   std::promise<void> began, go;
-  run_ = [&](const std::vector<closed_loop::Job>& jobs) {
+  // A copy of its own: the closed loop may end after this test's body.
+  run_ = [&began, released = go.get_future().share()](const std::vector<closed_loop::Job>& jobs) {
     began.set_value();  // a second group would throw
-    go.get_future().wait();
+    released.wait();
     closed_loop::Outcome o;
     o.rms_error_rad = 1.0;
     return std::vector<closed_loop::Outcome>(jobs.size(), o);
@@ -332,25 +333,27 @@ TEST_F(WorkbenchApi, ADriveThatIsNotInReachIsNotOpened) {
 }
 
 TEST(WorkbenchSession, WorkThatIsCancelledChangesNothingAndIsNotInTheWay) {
-  Session session("tab", std::make_shared<Step>());
-  std::promise<void> go, began;
+  // The session waits for its threads when it ends: what they use must outlive it.
+  std::promise<void> go, began, ran;
   bool changed = false;
-  session.start("slow", [&](const Progress& say) {
-    began.set_value();
-    go.get_future().wait();
-    say("");  // throws: it was cancelled
-    changed = true;
-  });
-  began.get_future().wait();
-  EXPECT_TRUE(session.works());
-  EXPECT_THROW(session.start("second", [](const Progress&) {}), BusyError);
-  session.cancel();
-  EXPECT_FALSE(session.works());
-  std::promise<void> ran;
-  session.start("third", [&](const Progress&) { ran.set_value(); });
-  EXPECT_EQ(ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
-  go.set_value();
-  session.cancel();
+  {
+    Session session("tab", std::make_shared<Step>());
+    session.start("slow", [&](const Progress& say) {
+      began.set_value();
+      go.get_future().wait();
+      say("");  // throws: it was cancelled
+      changed = true;
+    });
+    began.get_future().wait();
+    EXPECT_TRUE(session.works());
+    EXPECT_THROW(session.start("second", [](const Progress&) {}), BusyError);
+    session.cancel();
+    EXPECT_FALSE(session.works());
+    session.start("third", [&](const Progress&) { ran.set_value(); });
+    EXPECT_EQ(ran.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    go.set_value();
+    session.cancel();
+  }
   EXPECT_FALSE(changed);
 }
 
@@ -450,9 +453,9 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
 }
 
 TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {
-  Session session("tab", first());
-  std::promise<void> go, began;
+  std::promise<void> go, began, ran;
   std::atomic<bool> fitted{false};
+  Session session("tab", first());
   session.start("slow", [&](const Progress& say) {
     began.set_value();
     go.get_future().wait();
@@ -463,7 +466,6 @@ TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {
   began.get_future().wait();
   session.cancel();
   go.set_value();
-  std::promise<void> ran;
   session.start("next", [&](const Progress&) { ran.set_value(); });
   ran.get_future().wait();
   session.join();
