@@ -75,6 +75,44 @@ TEST(NoisyTorsion, KeepsItsReversalsWhereAMaskWouldLeaveNothing) {
   EXPECT_NEAR(stiffness->value, kStiffness, 0.05 * kStiffness);
 }
 
+// A locked output, wound up by a slow torque: reversals are as frequent as the transient of a filter for it is long.
+data::Dataset wound_up_gear() {
+  constexpr double kFrequency_hz = 0.5, kTorque_nm = 10.0;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  data::Dataset dataset;
+  dataset.experiments.push_back(tests::written_experiment("locked", 1e-3, 12000, [&](double t, data::Experiment& e) {
+    const double torque = kTorque_nm * std::sin(kTurn * kFrequency_hz * t);
+    e[Column::motor_position].push_back(kRatio * torque / kStiffness + 2e-5 * noise(random));
+    e[Column::output_position].push_back(0.0);
+    e[Column::motor_torque].push_back(torque / kRatio + 2e-4 * noise(random));
+    e[Column::torque].push_back(torque + 1e-2 * noise(random));
+  }));
+  dataset.experiments.front().load = data::Load::locked;
+  dataset.drive.gear_ratio = kRatio;
+  return dataset;
+}
+
+TEST(ClearTorsion, GetsACutOffAtWhichTheMaskOfReversalsLeavesEnough) {
+  const auto found = identify(wound_up_gear(), tests::plain_model_with({"linear_stiffness"}), {});
+  const Pipeline& pipeline = found->prepared.pipeline;
+  EXPECT_FALSE(pipeline.keep_torsion_reversals);
+  EXPECT_GT(pipeline.row_cutoff_hz, 5.0);
+  EXPECT_NE(pipeline.reason.find("leaves samples of the torsion"), std::string::npos) << pipeline.reason;
+  EXPECT_FALSE(masks_most_torsion(found->prepared));
+  const auto stiffness = std::find_if(found->estimates.begin(), found->estimates.end(),
+                                      [](const Estimate& e) { return e.effect == "linear_stiffness"; });
+  ASSERT_NE(stiffness, found->estimates.end());
+  EXPECT_NEAR(stiffness->value, kStiffness, 0.005 * kStiffness);
+}
+
+TEST(ClearTorsion, KeepsACutOffThatTheUserStates) {
+  PipelineOptions stated;
+  stated.cutoff_hz = 5.0;
+  const auto found = identify(wound_up_gear(), tests::plain_model_with({"linear_stiffness"}), stated);
+  EXPECT_EQ(found->prepared.pipeline.row_cutoff_hz, 5.0);
+}
+
 // Whether too little is left where the mask leaves the first samples of each record, so large a share of them.
 bool leaves_too_little(double share) {
   const data::Dataset dataset = loaded_axis({.has_output_position = true});

@@ -158,8 +158,12 @@ void make_records(PreparedData& prepared, const std::vector<const Experiment*>& 
 void suit_to_records(PreparedData& prepared, const std::vector<const Experiment*>& experiments,
                      std::optional<double> law_rad_s, bool may_raise, bool keeps_motor_reversals) {
   Pipeline& pipeline = prepared.pipeline;
-  if (may_raise && pipeline.mask && raise_cutoff_for_mask(prepared, law_rad_s, slowest_sample_hz(experiments) / 10.0))
-    make_records(prepared, experiments, nullptr);
+  if (may_raise && pipeline.mask) {
+    const double highest_hz = slowest_sample_hz(experiments) / 10.0;
+    if (raise_cutoff_for_mask(prepared, law_rad_s, highest_hz)) make_records(prepared, experiments, nullptr);
+    if (masks_most_torsion(prepared) && raise_cutoff_for_torsion(prepared, highest_hz))
+      make_records(prepared, experiments, nullptr);
+  }
   // The cut-off is that of the other models, so that their errors can be compared.
   pipeline.keep_motor_reversals = keeps_motor_reversals;
   pipeline.keep_torsion_reversals = pipeline.mask && masks_most_torsion(prepared);

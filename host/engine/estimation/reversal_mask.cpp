@@ -167,6 +167,19 @@ Pipeline raised(Pipeline pipeline, double cutoff_hz) {
   return pipeline;
 }
 
+bool masks_most_torsion(const std::vector<Record>& records, const Pipeline& pipeline) {
+  double left = 0.0, all = 0.0;
+  for (const Record& r : records) {
+    if (!has_large_torsion(r, pipeline.row_cutoff_hz)) continue;
+    const double middle = mean_torsion(r);
+    const auto information = [&](std::size_t k) { return std::pow(r.inputs[k].torsion - middle, 2); };
+    for (std::size_t k = 0; k < r.inputs.size(); k += r.decimation) all += information(k);
+    if (shows_torsion(r))
+      for (const std::size_t k : r.rows[index(Balance::transmission)].samples) left += information(k);
+  }
+  return left < kLeastOfTorsion * all;
+}
+
 }  // namespace
 
 void choose_rows(Record& record, const Pipeline& pipeline) {
@@ -210,16 +223,7 @@ bool shows_torsion(const Record& r) {
 }
 
 bool masks_most_torsion(const PreparedData& prepared) {
-  double left = 0.0, all = 0.0;
-  for (const Record& r : prepared.records) {
-    if (!has_large_torsion(r, prepared.pipeline.row_cutoff_hz)) continue;
-    const double middle = mean_torsion(r);
-    const auto information = [&](std::size_t k) { return std::pow(r.inputs[k].torsion - middle, 2); };
-    for (std::size_t k = 0; k < r.inputs.size(); k += r.decimation) all += information(k);
-    if (shows_torsion(r))
-      for (const std::size_t k : r.rows[index(Balance::transmission)].samples) left += information(k);
-  }
-  return left < kLeastOfTorsion * all;
+  return masks_most_torsion(prepared.records, prepared.pipeline);
 }
 
 std::optional<double> slowest_law_rad_s(const model::Model& model) {
@@ -271,6 +275,28 @@ MaskCutoff cutoff_for_mask(const PreparedData& prepared, double highest_hz, std:
 }
 
 }  // namespace
+
+bool raise_cutoff_for_torsion(PreparedData& prepared, double highest_hz) {
+  Pipeline& pipeline = prepared.pipeline;
+  std::vector<const data::Experiment*> large;
+  for (const Record& r : prepared.records)
+    if (has_large_torsion(r, pipeline.row_cutoff_hz)) large.push_back(r.experiment);
+  for (double hz = kCutoffStep * pipeline.row_cutoff_hz; hz < kCutoffStep * highest_hz; hz *= kCutoffStep) {
+    const Pipeline tried = raised(pipeline, std::min(std::ceil(hz), highest_hz));
+    std::vector<Record> again(large.size());
+    in_parallel(large.size(), [&](std::size_t i) {
+      throw_if_cancelled();
+      again[i] = with_signals(*large[i], prepared.constants, tried);
+      choose_rows(again[i], tried);
+    });
+    if (masks_most_torsion(again, tried)) continue;
+    pipeline = tried;
+    pipeline.reason +=
+        fmt::format("; raised to {:.4g} Hz, so that the mask leaves samples of the torsion", pipeline.row_cutoff_hz);
+    return true;
+  }
+  return false;
+}
 
 bool raise_cutoff_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz) {
   Pipeline& pipeline = prepared.pipeline;

@@ -33,4 +33,8 @@ std::optional<double> slowest_law_rad_s(const model::Model& model);
 /// friction law of a given velocity needs. Returns whether it did; the records are to be made again then.
 bool raise_cutoff_for_mask(PreparedData& prepared, std::optional<double> law_rad_s, double highest_hz);
 
+/// The same for the transmission: raises the cut-off to the lowest one at which the mask leaves enough of the torsion.
+/// Where none does, the rate is hardly above its noise, the pipeline stays and the answer is false.
+bool raise_cutoff_for_torsion(PreparedData& prepared, double highest_hz);
+
 }  // namespace flexspline::estimation

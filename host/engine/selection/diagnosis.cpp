@@ -213,6 +213,20 @@ void describe_base(const SearchedBalance& chosen, Diagnosis& result) {
   });
 }
 
+// The errors of the motor's balance, in place of those of the one that was judged.
+void describe_motor_instead(const SearchedBalance& judged, const SearchedBalance& motor, Diagnosis& result) {
+  if (result.noise_floor)
+    result.warnings.push_back(fmt::format(
+        "the {} balance has an error of {:.3g} times its noise, which no effect of the catalogue explains; flexspline "
+        "compare shows where",
+        catalogue::balance_name(judged.search.data->balance()), result.base_rmse / *result.noise_floor));
+  describe_base(motor, result);
+  const CrossValidatedFit& fit = motor.search.base;
+  result.localised = shares(*motor.search.data, fit, fit.residual_fixed_effects());
+  result.remaining_structure = shares(*motor.search.data, fit, fit.residual);
+  result.unknown.reset();
+}
+
 void explain_orders(const model::Drive& drive, Diagnosis& result) {
   for (Candidate& c : result.candidates) {
     const catalogue::Entry* entry = catalogue::find(c.effect);
@@ -276,6 +290,13 @@ std::string delay_advice(double delay_s, const estimation::PreparedData& prepare
   return what + " beyond the alignment: check the time stamps, or current_hold in dataset.toml.";
 }
 
+void add_drifts(const SearchedBalance& balance, const CrossValidatedFit& fit, Diagnosis& result) {
+  for (const Drift& d : drifts(fit)) {
+    result.friction_drift.push_back(d);
+    result.warnings.push_back(drift_text(d, balance.search.data->prepared()));
+  }
+}
+
 // What is left, with the named effect in the model if there is one.
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
@@ -288,8 +309,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
       std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
     result.delay_s = after.theta[delay];
-  result.friction_drift = drifts(after);
-  for (const Drift& d : result.friction_drift) result.warnings.push_back(drift_text(d, chosen.search.data->prepared()));
+  add_drifts(chosen, after, result);
   const bool at_floor = result.noise_floor && after.rmse() < kPolicy.at_floor * *result.noise_floor;
   bool enough = true;
   if (result.noise_floor && !result.named.empty()) {
@@ -310,6 +330,15 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   else
     result.verdict =
         result.noise_floor && !remaining.empty() ? Verdict::unknown_structure : Verdict::nothing_significant;
+}
+
+// Friction differs between records on the motor's balance, whichever one was judged.
+void look_between_records(const estimation::Identification& base, const estimation::Identification& all_records,
+                          const SearchedBalance& judged, const SearchedBalance& motor, Diagnosis& result) {
+  const bool is_other = &judged != &motor;
+  if (is_other) add_drifts(motor, motor.search.base, result);
+  name_between_records(base, all_records, motor, result);
+  if (is_other && !result.named.empty()) describe_motor_instead(judged, motor, result);
 }
 
 // Whether the data could show anything at all.
@@ -371,8 +400,9 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (by_resampling) name_stable(chosen, result);
   if (names_one) name_by_likelihood(chosen, alias, result);
   take_back_insignificant(result);
+  const bool tests_between_records = decides && (by_resampling || result.named.empty());
   const std::unique_ptr<AllRecords> all_records =
-      by_resampling ? fit_all_records(chosen, dataset, model, options.pipeline) : nullptr;
+      tests_between_records ? fit_all_records(*motor, dataset, model, options.pipeline) : nullptr;
   const estimation::Identification& of_all_records = all_records ? *all_records->fitted : *base;
   if (by_resampling) take_back_unconfirmed_scaling(of_all_records, chosen, result);
   if (!result.named.empty()) explain_named(chosen.search, chosen.candidates, model.drive, result);
@@ -383,8 +413,8 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     if (options.progress) options.progress("looking for what no effect explains");
     check_unknown_structure(chosen.search, names_one ? &chosen.candidates.front() : nullptr, result);
   }
-  if (by_resampling) name_between_records(*base, of_all_records, chosen, result);
-  name_on_other_balances(all, chosen, model.drive, result);
+  if (tests_between_records) look_between_records(*base, of_all_records, chosen, *motor, result);
+  name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *motor : chosen, model.drive, result);
   take_back_insignificant(result);
   explain_orders(base->model.drive, result);
   assess_excitation(moves, result);
