@@ -35,6 +35,21 @@ TEST(UnseenDirection, LeavesOutTheAmplitudeThatNoSampleShows) {
   EXPECT_EQ(known_on(20.0, 0.0), (std::vector<std::uint8_t>{0, 0, 0})) << "both ways";
 }
 
+// Whether an asymmetry may be seen on one record that moves forward alone and one that moves both ways.
+bool asymmetry_is_seen(data::Role role_of_both_ways) {
+  const auto none = [](double, double) { return 0.0; };
+  data::Experiment forward = tests::two_sines(1.0, 20.0, none), both_ways = tests::two_sines(20.0, 0.0, none);
+  both_ways.role = role_of_both_ways;
+  const estimation::PreparedData prepared = estimation::prepare({&forward, &both_ways}, {}, kOptions);
+  return may_be_seen(RegressionProblem(prepared, Balance::motor), estimation::terms_of(tests::plain_model()),
+                     catalogue::get("coulomb_asymmetry"));
+}
+
+TEST(Directions, ThatHeldOutRecordsAloneShowAreNotSeen) {
+  EXPECT_TRUE(asymmetry_is_seen(data::Role::fit));
+  EXPECT_FALSE(asymmetry_is_seen(data::Role::holdout));
+}
+
 // Whether an offset and gravity are one group on such a record.
 bool are_confounded(double amplitude_rad, const std::function<double(double)>& more) {
   const data::Experiment e = tests::two_sines(amplitude_rad, 0.0, [&](double, double q) { return more(q); });

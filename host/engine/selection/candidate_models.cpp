@@ -15,9 +15,16 @@
 namespace flexspline::selection {
 
 bool moves_both_ways(const RegressionProblem& data) {
+  const std::vector<estimation::Record>& records = data.prepared().records;
+  const auto is_held_out = [&](const estimation::RowRange& range) {
+    return records[range.record].experiment->role == data::Role::holdout;
+  };
+  // What is fitted has to show the directions. Where all is held out, all is fitted.
+  const bool all_held_out = std::all_of(data.records().begin(), data.records().end(), is_held_out);
   int forward_only = 0, backward_only = 0;
   for (const auto& range : data.records()) {
-    const estimation::Record& r = data.prepared().records[range.record];
+    if (is_held_out(range) && !all_held_out) continue;
+    const estimation::Record& r = records[range.record];
     if (r.at_rest) return true;
     double forward = 0.0, backward = 0.0;
     for (const std::size_t k : r.rows[estimation::index(data.balance())].samples) {

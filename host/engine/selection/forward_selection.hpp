@@ -1,4 +1,5 @@
-// Forward selection of terms: fitted on one half of the data, accepted by what they take off the other half.
+// Stepwise selection of terms (Efroymson 1960): fitted on one half of the data, accepted by what they take off the
+// other half; an earlier term that later ones make needless is taken off again.
 #pragma once
 
 #include <string>

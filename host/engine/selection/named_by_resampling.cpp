@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/engine/selection/joint_names.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
 
@@ -31,8 +32,7 @@ const CandidateFit* judged_candidate(const Resampling::FoundTerm& found, const S
 }
 
 bool is_of_family(const std::string& effect, std::optional<double> order, const CandidateFit& candidate) {
-  const NamedEffect name{std::string(candidate.model.entry->name()), candidate.model.order};
-  return selection::is_of_family(NamedEffect{effect, order}, name);
+  return selection::is_of_family(NamedEffect{effect, order}, name_of(candidate));
 }
 
 // Of a candidate; nothing where resampling cannot choose it: it has no linear parameter, or more nonlinear ones than
@@ -264,7 +264,7 @@ std::vector<PossibleEffect> possible_effects(const Resampling& resampling, const
   // What likelihood alone would name.
   if (!motor.names_one()) return all;
   const CandidateFit& first = motor.candidates.front();
-  const NamedEffect name{std::string(first.model.entry->name()), first.model.order};
+  const NamedEffect name = name_of(first);
   const auto is_listed = [&](const PossibleEffect& p) {
     return std::any_of(p.group.begin(), p.group.end(),
                        [&](const NamedEffect& n) { return is_of_family(n.effect, n.order, first); });
@@ -389,6 +389,21 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   const StableNames stable = stable_names(*result.resampling, chosen);
   result.named = stable.names;
   result.possible = possible_effects(*result.resampling, chosen, names_of(*result.resampling, chosen));
+  if (!stable.is_group) {
+    JointNames joint = eliminate_backward(*result.resampling, chosen, stable.names);
+    result.named = std::move(joint.names);
+    const auto is_named = [&](const PossibleEffect& p) {
+      return std::any_of(result.named.begin(), result.named.end(), [&](const NamedEffect& n) {
+        return p.group.size() == 1 && p.group.front().effect == n.effect && p.group.front().order == n.order;
+      });
+    };
+    std::erase_if(result.possible, is_named);
+    for (NamedEffect& name : joint.eliminated)
+      result.possible.push_back({{std::move(name)},
+                                 "once the other effects are in the model, left-out data gain nothing by it",
+                                 std::nullopt,
+                                 std::nullopt});
+  }
   const bool is_group = add_other_scale(chosen, result.named) || stable.is_group;
   result.partial =
       static_cast<std::ptrdiff_t>(result.resampling->found.size()) > (is_group ? 1 : std::ssize(result.named));

@@ -1,12 +1,17 @@
 // What is named of what resampling found on the motor's balance.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/engine/selection/searched_balance.hpp"
 
 namespace flexspline::selection {
+
+inline NamedEffect name_of(const CandidateFit& candidate) {
+  return {std::string(candidate.model.entry->name()), candidate.model.order};
+}
 
 // Whether two names are one, or two laws of a family: resampling has the nonlinear parameters at fixed values only, and
 // one law of presliding for all, so likelihood decides which law of the family it is.

@@ -45,10 +45,6 @@ bool is(const Candidate& c, const NamedEffect& n) {
   return c.effect == n.effect && c.order == n.order;
 }
 
-NamedEffect name_of(const CandidateFit& candidate) {
-  return {std::string(candidate.model.entry->name()), candidate.model.order};
-}
-
 // Whether resampling could not distinguish a candidate from the first one, and it leaves a similar error on all data.
 bool is_in_group(const std::optional<Resampling>& resampling, const CandidateFit& first, const CandidateFit& t) {
   if (!resampling) return false;

@@ -1,0 +1,99 @@
+// Of several names each has to gain something while the others are in the model: torques that are written down, with a
+// drag that grows with the square of the speed.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "host/engine/selection/joint_names.hpp"
+#include "shared/fixed/turn.hpp"
+#include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
+
+namespace flexspline::selection::selection_joint_names_test {
+namespace {
+
+using data::Column;
+
+const NamedEffect kDrag{"quadratic_drag", std::nullopt}, kStribeck{"stribeck_gaussian", std::nullopt};
+
+// An axis with that drag, and as much of `stribeck_nm` at standstill.
+class NamesTogether : public ::testing::Test {
+ protected:
+  SearchedBalance& axis(double stribeck_nm) {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    for (const double hz : {0.3, 0.5, 0.8})
+      dataset_.experiments.push_back(
+          tests::written_experiment(std::to_string(hz), 2e-3, 6000, [&](double t, data::Experiment& e) {
+            const double rate = kTurn * hz, q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t);
+            const double direction = w > 0.0 ? 1.0 : -1.0;
+            e[Column::motor_position].push_back(q);
+            e[Column::motor_torque].push_back(
+                -1e-4 * rate * rate * q + 1e-3 * w + 0.05 * direction + 2e-6 * w * std::abs(w) +
+                stribeck_nm * std::exp(-w * w / 400.0) * direction + 5e-4 * noise(random));
+          }));
+    identified_ = estimation::identify(dataset_, tests::plain_model(), {});
+    const RegressionProblem& data = identified_->data.front();
+    motor_.search = {&data, Eigen::VectorXd::Ones(data.rows()), {}};
+    motor_.search.base = cross_validate(data, identified_->terms, motor_.search.keep);
+    motor_.candidates = rank_candidates(motor_.search);
+    return motor_;
+  }
+  static Resampling found(const std::vector<NamedEffect>& names) {
+    Resampling resampling;
+    for (const NamedEffect& n : names) resampling.found.push_back({.group = {n}, .frequency = 0.8});
+    return resampling;
+  }
+  static std::vector<std::string> effects(const std::vector<NamedEffect>& names) {
+    std::vector<std::string> list;
+    for (const NamedEffect& n : names) list.push_back(n.effect);
+    return list;
+  }
+
+ private:
+  data::Dataset dataset_;
+  std::unique_ptr<estimation::Identification> identified_;
+  SearchedBalance motor_;
+};
+
+TEST_F(NamesTogether, WhatOnlyResemblesTheTrueOneIsTakenOff) {
+  const JointNames joint = eliminate_backward(found({kDrag, kStribeck}), axis(0.0), {kStribeck, kDrag});
+  EXPECT_EQ(effects(joint.names), std::vector<std::string>{"quadratic_drag"});
+  EXPECT_EQ(effects(joint.eliminated), std::vector<std::string>{"stribeck_gaussian"});
+}
+
+TEST_F(NamesTogether, ThoseThatAreBothThereStay) {
+  const JointNames joint = eliminate_backward(found({kDrag, kStribeck}), axis(0.02), {kStribeck, kDrag});
+  EXPECT_EQ(effects(joint.names), (std::vector<std::string>{"stribeck_gaussian", "quadratic_drag"}));
+  EXPECT_TRUE(joint.eliminated.empty());
+}
+
+TEST_F(NamesTogether, TheLikeliestReplacesWhatItMakesNeedlessWhereHalvesChoseIt) {
+  const SearchedBalance& motor = axis(0.0);
+  EXPECT_EQ(effects(eliminate_backward(found({kStribeck, kDrag}), motor, {kStribeck}).names),
+            std::vector<std::string>{"quadratic_drag"});
+  const JointNames unchosen = eliminate_backward(found({kStribeck}), motor, {kStribeck});
+  EXPECT_TRUE(unchosen.names.empty());
+  EXPECT_EQ(effects(unchosen.eliminated), std::vector<std::string>{"stribeck_gaussian"});
+}
+
+TEST_F(NamesTogether, HeldOutExperimentsDecideWhetherItReplacesWhereThereAreAny) {
+  SearchedBalance& motor = axis(0.0);
+  motor.candidates.front().held_out_ratio = 0.999;
+  EXPECT_TRUE(eliminate_backward(found({kStribeck, kDrag}), motor, {kStribeck}).names.empty());
+  motor.candidates.front().held_out_ratio = 0.7;
+  EXPECT_EQ(effects(eliminate_backward(found({kStribeck}), motor, {kStribeck}).names),
+            std::vector<std::string>{"quadratic_drag"});
+}
+
+TEST_F(NamesTogether, PreslidingIsNotJudgedAndASingleNameStays) {
+  const NamedEffect presliding{"dahl_friction", std::nullopt};
+  const SearchedBalance& motor = axis(0.0);
+  EXPECT_EQ(eliminate_backward(found({presliding, kDrag}), motor, {presliding, kDrag}).names.size(), 2U);
+  EXPECT_EQ(eliminate_backward(found({kDrag}), motor, {kDrag}).names.size(), 1U);
+  EXPECT_TRUE(eliminate_backward({}, motor, {}).names.empty());
+}
+
+}  // namespace
+}  // namespace flexspline::selection::selection_joint_names_test
