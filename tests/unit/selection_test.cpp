@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
-#include <set>
 
 #include "host/engine/estimation/variance_components.hpp"
 #include "host/engine/selection/bandwidth.hpp"
@@ -275,24 +274,6 @@ TEST(ForwardSelection, ChoosesWhatIsThereAndNothingElse) {
   ASSERT_EQ(selected.steps.size(), 1U);
   EXPECT_EQ(selected.steps[0].term, 7);
   EXPECT_NEAR(selected.steps[0].of_all, 1.0, 0.05);
-}
-
-// The best single column is the sum of two that are there: once these are in, it is taken off again (the classical case
-// for backward elimination; Berk 1978).
-TEST(ForwardSelection, AnEarlierTermThatLaterOnesMakeNeedlessIsTakenOffAgain) {
-  Random r = random_table(4000, 20, 8);
-  r.rows.col(4) = r.rows.col(9) + r.rows.col(12) + 0.3 * r.rows.col(4);
-  r.rows.col(22) = 0.1 * r.rows.col(22) + r.rows.col(9) + r.rows.col(12);
-  const HalfData a = half_of(r.rows.topRows(2000)), b = half_of(r.rows.bottomRows(2000));
-  const SelectionPath selected = select_forward(r.table, a, b, {0.01, 1.0}, {});
-  std::set<int> terms;
-  double of_all = 0.0;
-  for (const SelectionStep& s : selected.steps) {
-    terms.insert(s.term);
-    of_all += s.of_all;
-  }
-  EXPECT_EQ(terms, (std::set<int>{7, 10}));
-  EXPECT_NEAR(of_all, 1.0, 0.05);
 }
 
 TEST(ForwardSelection, AbstainsWhereNothingStandsAboveTheNoise) {

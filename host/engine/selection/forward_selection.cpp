@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
-
 #include "host/common/algebra/decompositions.hpp"
 
 namespace flexspline::selection {
@@ -190,34 +188,7 @@ class ForwardStep {
     was_possible_ = is_possible(table_, terms_, now_, fit_);
   }
 
-  // Takes off an earlier term that gains no more than by chance now that the last one is in. Returns its place;
-  // nothing: all are needed.
-  std::optional<std::size_t> eliminate() {
-    std::optional<std::size_t> least;
-    TermFit left;
-    for (std::size_t i = 0; i + 1 < terms_.size(); ++i) {
-      const std::vector<int> others = without(i);
-      TermFit fitted = fit_terms(table_, others, fit_, validation_);
-      const double by_chance = fitted.validation_squares / validation_.rows * noise_.tau;
-      if (fitted.validation_squares - now_.validation_squares > policy_.least_gain * by_chance) continue;
-      if (least && fitted.validation_squares >= left.validation_squares) continue;
-      if (was_possible_ && !is_possible(table_, others, fitted, fit_)) continue;
-      least = i;
-      left = std::move(fitted);
-    }
-    if (!least) return std::nullopt;
-    terms_ = without(*least);
-    now_ = std::move(left);
-    was_possible_ = is_possible(table_, terms_, now_, fit_);
-    return least;
-  }
-
  private:
-  std::vector<int> without(std::size_t place) const {
-    std::vector<int> others = terms_;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(place));
-    return others;
-  }
   bool is_excluded(const CandidateTerm& term) const {
     return std::any_of(terms_.begin(), terms_.end(), [&](int t) {
       return t >= 0 && std::find(term.excludes.begin(), term.excludes.end(),
@@ -280,11 +251,6 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
     const double drop = at.now().validation_squares - chosen.fitted.validation_squares;
     result.steps.push_back({chosen.term, drop / at.above(), drop / excess, at.alternatives(by_name, chosen)});
     at.take(chosen);
-    while (const auto place = at.eliminate()) {
-      // What it explained is explained without it.
-      result.steps.back().of_all += result.steps[*place].of_all;
-      result.steps.erase(result.steps.begin() + static_cast<std::ptrdiff_t>(*place));
-    }
     result.after = at.now().validation_squares;
     if (result.after - at.floor() < policy.least_excess * result.after) break;
   }

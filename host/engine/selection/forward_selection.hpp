@@ -1,5 +1,4 @@
-// Stepwise selection of terms (Efroymson 1960): fitted on one half of the data, accepted by what they take off the
-// other half; an earlier term that later ones make needless is taken off again.
+// Forward selection of terms: fitted on one half of the data, accepted by what they take off the other half.
 #pragma once
 
 #include <string>
