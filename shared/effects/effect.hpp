@@ -56,7 +56,8 @@ enum Signals : std::uint16_t {
   kTorqueScale = 512,      // needs something that fixes the torque scale: a known parameter, or a loaded torque sensor
 };
 
-// A unit on a rotary axis and its counterpart on a linear one.
+// A unit on a rotary axis and its counterpart on a linear one: N*m becomes N, kg*m^2 kg and rad m, without brackets
+// about one unit: {"1/(N*m)", "1/N"}.
 struct Unit {
   std::string_view rotary;
   std::string_view linear;

@@ -148,6 +148,24 @@ int main() {
 }
 )");
   shell.must("c++ -std=c++20 -Wall -Wextra -Werror -I. -I'" + root.string() + "' try.cpp -o try && ./try");
+  // What `./dev effect --check` says of it, and of a law whose exponent can leave its range.
+  const std::string check = "'" + (root / "tests/support/check_effect.sh").string() + "' checked cubic_drag .";
+  const std::string checked = shell.must(check);
+  EXPECT_TRUE(contains(checked, "compiled for a drive (Fixed, Checked, Intervals, ErrorNumbers)")) << checked;
+  EXPECT_TRUE(contains(checked, "pack proves it at its usual size")) << checked;
+  const auto with = [&](const std::string& factor) {
+    std::string header = files[0].text;
+    const std::string last = ", in.speed);\n";
+    header.replace(header.find(last), last.size(), ", " + factor + ");\n");
+    shell.write(files[0].argument, header);
+    return shell.run(check);
+  };
+  const Answer left = with("N::exp_negative(N::times(in.velocity, in.speed))");
+  EXPECT_EQ(left.code, 1);
+  EXPECT_TRUE(contains(left.out, "pack refuses it at its usual size: an exponential may reach its limit")) << left.out;
+  const Answer broken = with("N::exp_negative(in.angle)");
+  EXPECT_EQ(broken.code, 1);
+  EXPECT_TRUE(contains(broken.err, "error: ")) << broken.err;
 }
 
 }  // namespace

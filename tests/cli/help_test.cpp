@@ -68,6 +68,8 @@ TEST(Help, AWrongCommandNamesTheNearestOne) {
   const Answer answer = shell.run("flexspline identfy");
   EXPECT_EQ(answer.code, 2);
   EXPECT_TRUE(contains(answer.err, "did you mean identify?")) << answer.err;
+  const Answer transposed = shell.run("flexspline plna");
+  EXPECT_TRUE(contains(transposed.err, "did you mean plan?")) << transposed.err;
   EXPECT_EQ(shell.run("flexspline").code, 2);
 }
 

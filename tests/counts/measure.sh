@@ -30,7 +30,7 @@ if [[ $1 == bits ]]; then
     if diff "$folder/bits-$machine.txt" "$here/../same_bits/recorded_few.txt" >&2; then
       echo "$machine: the recorded bits, $(tail -n 1 "$folder/bits-$machine.txt")"
     else
-      echo "$machine: other bits than those recorded; where that was meant: cp $folder/bits-$machine.txt $here/../same_bits/recorded_few.txt" >&2
+      echo "$machine: other bits than those recorded; where that was meant: ./dev bits record" >&2
       status=1
     fi
   done

@@ -140,6 +140,26 @@ Violations broken_arrows(const std::vector<SourceFile>& files) {
   return found;
 }
 
+// A board's image is built anew where its own folder changes, or one of these (boards/CMakeLists.txt).
+Violations boards_of_others(const std::vector<SourceFile>& files) {
+  const auto board_of = [](std::string_view path) {
+    const std::string_view inside = path.substr(path.find('/') + 1);
+    return std::string(inside.substr(0, inside.find('/')));
+  };
+  Violations found;
+  for (const SourceFile& file : files) {
+    if (!is_cpp(file.path) || top_folder(file.path) != "boards") continue;
+    for (const Include& include : includes_of(file)) {
+      if (top_folder(include.name) != "boards") continue;
+      const std::string board = board_of(include.name);
+      if (board != board_of(file.path) && board != "stm32f4" && board != "cortex_m4")
+        found.push_back(place(file, include.line) + "includes another board's " + include.name +
+                        "; what boards share is in stm32f4 and cortex_m4");
+    }
+  }
+  return found;
+}
+
 std::size_t host_group(std::string_view path) {
   const std::string_view inside = path.substr(std::min(path.size(), std::string_view("host/").size()));
   const auto group = std::find(kHostGroups.begin(), kHostGroups.end(), inside.substr(0, inside.find('/')));
@@ -310,6 +330,9 @@ TEST(Architecture, FoldersIncludeOnlyWhatTheyMay) {
 TEST(Architecture, GroupsOfHostIncludeOnlyWhatStandsBelowThem) {
   EXPECT_NO_VIOLATION(arrows_up_in_host(project_files()));
 }
+TEST(Architecture, BoardsIncludeNothingOfOtherBoards) {
+  EXPECT_NO_VIOLATION(boards_of_others(project_files()));
+}
 TEST(Architecture, SharedUsesNoHeapNoExceptionsAndNoMathLibrary) {
   EXPECT_NO_VIOLATION(forbidden_in_shared(project_files()));
 }
@@ -359,6 +382,14 @@ TEST(ArchitectureRules, ArrowsUpInHostAndFilesOutsideItsGroupsAreFound) {
   EXPECT_EQ(of("host/elsewhere/a.cpp", "").size(), 1u);
 }
 
+TEST(ArchitectureRules, AnIncludeOfAnotherBoardIsFound) {
+  EXPECT_EQ(boards_of_others({{"boards/a/main.cpp", "#include \"boards/b/board.hpp\"\n"}}).size(), 1u);
+  EXPECT_EQ(boards_of_others({{"boards/stm32f4/a.hpp", "#include \"boards/b/board.hpp\"\n"}}).size(), 1u);
+  EXPECT_TRUE(boards_of_others({{"boards/a/main.cpp",
+                                 "#include \"boards/a/board.hpp\"\n#include \"boards/stm32f4/drive.hpp\"\n"
+                                 "#include \"shared/a.hpp\"\n"}})
+                  .empty());
+}
 TEST(ArchitectureRules, HeadersOutsideTheAllowListAreFoundInShared) {
   for (const char* header : {"cmath", "math.h", "vector", "string", "new", "Eigen/Dense"}) {
     EXPECT_EQ(arrows_of("shared/a.hpp", std::string("#include <") + header + ">\n").size(), 1u) << header;

@@ -194,12 +194,15 @@ std::string on_linear_axis(std::string unit) {
   };
   replace("kg*m^2", "kg");
   replace("N*m", "N");
+  replace("(N)", "N");
   replace("rad", "m");
   return unit;
 }
 
 TEST(Catalogue, LinearAxisHasForcesAndMetresForTorquesAndAngles) {
   EXPECT_EQ(on_linear_axis("N*m*s^2/rad^2"), "N*s^2/m^2");
+  EXPECT_EQ(on_linear_axis("1/(N*m)"), "1/N");
+  EXPECT_EQ(on_linear_axis("rad/(N*m*s)"), "m/(N*s)");
   for (const Entry& entry : catalogue::all())
     for (const auto& parameter : entry.parameters)
       EXPECT_EQ(parameter.unit.linear, on_linear_axis(std::string(parameter.unit.rotary))) << entry.name();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <set>
 
 #include "tests/unit/effects_truths.hpp"
 
@@ -229,13 +230,33 @@ TEST_P(EveryEffect, IsProportionalToItsLinearParameters) {
   for (std::size_t k = 0; k < record.size(); ++k) ASSERT_NEAR(sum[k], all[k], rounding);
 }
 
+// Sources without memory: those that resist motion whatever the other signals are, and those that need not.
+const std::set<std::string, std::less<>> kResist = {
+    "viscous_friction",   "coulomb_friction",        "stribeck_gaussian",       "stribeck_hess_soom",
+    "power_law_friction", "quadratic_drag",          "load_dependent_friction", "load_dependent_stiction",
+    "structural_damping", "output_viscous_friction", "output_coulomb_friction"};
+const std::string_view kNeedNotResist =
+    "angle_dependent_friction,coulomb_asymmetry,cubic_stiffness,current_offset,current_saturation,gravity,inertia,"
+    "linear_stiffness,load_scaled_ripple,output_inertia,piecewise_stiffness,quadratic_stiffness,torque_bias,"
+    "torque_constant_error,torque_constant_saturation,torque_offset,torque_ripple,torque_sensor_gain,"
+    "torque_sensor_ripple,viscous_asymmetry";
+
+TEST(FrictionEffects, EachLawWithoutMemorySaysWhetherItResistsMotion) {
+  std::set<std::string, std::less<>> named = kResist;
+  for (const std::string_view name : catalogue::split_names(kNeedNotResist))
+    EXPECT_TRUE(named.emplace(name).second) << name << " is listed twice";
+  for (const Entry& entry : catalogue::all())
+    if (entry.info->phase == catalogue::Phase::source && !entry.has_state &&
+        named.erase(std::string(entry.name())) == 0)
+      ADD_FAILURE() << entry.name() << ": write it into kResist or kNeedNotResist";
+  for (const std::string& name : named) ADD_FAILURE() << name << " is no source without memory";
+}
+
 // At rest static friction is the simulator's to solve: no effect may push by a sign that is not there.
 TEST(FrictionEffects, ResistMotionAndAreZeroAtRest) {
   std::mt19937 random(9);
   const Record record = random_record(random);
-  for (const char* name : {"viscous_friction", "coulomb_friction", "stribeck_gaussian", "stribeck_hess_soom",
-                           "power_law_friction", "quadratic_drag", "load_dependent_friction", "load_dependent_stiction",
-                           "structural_damping", "output_viscous_friction", "output_coulomb_friction"}) {
+  for (const std::string& name : kResist) {
     const Entry& entry = catalogue::get(name);
     Values parameters;
     for (const auto& info : entry.parameters) parameters.push_back(info.usual);

@@ -244,5 +244,13 @@ TEST(ModelParse, NamesTheLineOfEveryMistakeElsewhere) {
   expect_error(kHead + "a = 1\"\u00e4\"", 2, "expected digit", "correct");
 }
 
+TEST(ModelParse, AFileOfAnotherKindIsNoModelFileAndIsNotToBeCorrected) {
+  for (const char* other : {"time,current\n0,1\n", "{\"format\": 1}", "[1, 2]", "# Notes\n",
+                            "\x7f"
+                            "ELF"})
+    expect_error(other, 1, "this is not a model file", "format = \"flexspline-model/1\"");
+  EXPECT_EQ(error_of("time,current\n").find("correct"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace flexspline::model::model_parse_test

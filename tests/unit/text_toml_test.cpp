@@ -62,6 +62,16 @@ TEST(Toml, BracketsInsideValuesAreNoHeaders) {
   EXPECT_EQ(error_line("[\"a]b\"]\nc = 1\n['\u00E4']\n"), 0u);
 }
 
+TEST(Toml, AMessageQuotesTheBeginningOfALongLine) {
+  try {
+    parse_toml("[`" + std::string(500, 'x') + "]\n");
+    ADD_FAILURE() << "no error";
+  } catch (const TomlError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "no name follows the bracket in [`" + std::string(58, 'x') + "... (443 more characters)");
+  }
+}
+
 TEST(Toml, LettersBeyondAsciiOutsideQuotesAreErrorsWithTheirLine) {
   for (const std::string letter : {"\u00A1", "\u00B2", "\u00E4", "\u00D7", "\u03BC", "\u4E2D", "\u2028", "\xFF"}) {
     EXPECT_EQ(error_line("a = 1\n" + letter + " = 2\n"), 2u) << letter;
@@ -73,10 +83,18 @@ TEST(Toml, LettersBeyondAsciiOutsideQuotesAreErrorsWithTheirLine) {
 
 TEST(Nearest, AllowsAThirdOfTheWord) {
   EXPECT_EQ(nearest("gear_ration", {"gear_ratio", "pitch_m"}), "gear_ratio");
-  EXPECT_EQ(nearest("sdt", {"std"}), "");
-  EXPECT_EQ(nearest("sdt", {"std"}, 2), "std");
+  EXPECT_EQ(nearest("sdx", {"std"}), "");
+  EXPECT_EQ(nearest("sdx", {"std"}, 2), "std");
   EXPECT_EQ(nearest("ab", {"xb", "ax"}), "xb");
   EXPECT_EQ(nearest("", {"abc"}), "");
+}
+
+TEST(Nearest, TwoNeighboursThatChangedPlacesAreOneEdit) {
+  EXPECT_EQ(nearest("inof", {"info", "plan"}), "info");
+  EXPECT_EQ(nearest("palns", {"plant", "plane", "plans"}), "plans");
+  EXPECT_EQ(nearest("ca", {"abc"}), "") << "no letter is edited twice: three edits, not two";
+  EXPECT_EQ(nearest("ca", {"abc"}, 2), "");
+  EXPECT_EQ(nearest("ca", {"abc"}, 3), "abc");
 }
 
 TEST(Nearest, FirstWordsCountOnlyWhereNoWholeNameIsNear) {

@@ -10,8 +10,9 @@
 
 namespace flexspline::text {
 
-// The entry of `known` with the fewest edits to `word` (letters put in, left out or replaced), the first of several;
-// empty where more than a third of the word, and more than `always_allowed` letters, would change.
+// The entry of `known` with the fewest edits to `word` (letters inserted, deleted, substituted, or two neighbours
+// transposed), the first of several; empty where more than a third of the word, and more than `always_allowed` letters,
+// would change.
 std::string nearest(std::string_view word, std::span<const std::string_view> known, std::size_t always_allowed = 1);
 std::string nearest(std::string_view word, std::initializer_list<std::string_view> known,
                     std::size_t always_allowed = 1);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "host/common/text/shortened.hpp"
+
 // The reader asserts what it then checks itself: a header such as "[.x]" would end the program where asserts are on,
 // and let the optimiser leave out the check where they are off. Without either it is an error with a line. Its tests of
 // characters call all but some white space unreachable, so that a letter such as U+00E9 outside quotes is undefined
@@ -109,6 +111,8 @@ std::size_t end_of_quotes(std::string_view text, std::size_t at) {
   return text.size();
 }
 
+constexpr std::size_t kQuoted = 60;  // characters of a line in a message
+
 // Refuses what the reader does not survive in all its builds, and letters beyond ASCII with a message of its own.
 class Guard {
  public:
@@ -156,7 +160,7 @@ class Guard {
              std::string_view("_-\"']").find(c) != std::string_view::npos;
     };
     if (key == std::string_view::npos || !begins_key(header[key]))
-      throw TomlError(line(), 0, fmt::format("no name follows the bracket in {}", header),
+      throw TomlError(line(), 0, fmt::format("no name follows the bracket in {}", shortened(header, kQuoted)),
                       "correct the line: the name of the table is between the brackets");
   }
 
