@@ -461,14 +461,15 @@ void LiveDrive::listen() {
         subscribed_ = true;
         samples_.clear();
         first_tick_ = 0;
-        last_read_ = Clock::now();
+        silence_.emplace(kSilence, Clock::now());
       } else if (lock.owns_lock() && session_ && subscribed_ && !wanted) {
         session_->subscribe({}, 1);
         subscribed_ = false;
       }
       if (wanted) {
-        const auto message = session_->next(drive::Milliseconds(20));
-        if (message) last_read_ = Clock::now();
+        constexpr drive::Milliseconds kWait{20};
+        const auto message = session_->next(kWait);
+        silence_->waited(kWait, message.has_value(), Clock::now());
         const double every = std::clamp(std::round(session_->identity().tick_hz / kRateHz), 1.0, 65535.0);
         if (message && message->is_unasked())
           protocol::for_each_frame(
@@ -484,7 +485,7 @@ void LiveDrive::listen() {
                 ++count_;
                 if (samples_.size() > kStoredSamples) samples_.pop_front();
               });
-        if (Clock::now() - last_read_ > kSilence)
+        if (silence_->is_too_long())
           session_->fail("the drive went silent; check cable and power, then connect it again");
       }
     } catch (const std::exception& error) {

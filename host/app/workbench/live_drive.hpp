@@ -17,6 +17,7 @@
 #include "host/drive_link/drive/recorder.hpp"
 #include "host/drive_link/drive/scales.hpp"
 #include "host/drive_link/drive/session.hpp"
+#include "host/drive_link/drive/silence.hpp"
 #include "host/physics/model/model.hpp"
 
 namespace flexspline::workbench {
@@ -120,7 +121,8 @@ class LiveDrive {
   std::uint32_t first_tick_ = 0;
   bool subscribed_ = false;
   std::string mode_;
-  std::chrono::steady_clock::time_point last_read_, asked_;
+  std::optional<drive::Silence> silence_;  // from a subscription on
+  std::chrono::steady_clock::time_point asked_;
   std::atomic<bool> ends_{false};
   std::thread listener_;
 };
