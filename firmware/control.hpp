@@ -52,7 +52,7 @@ struct Estimate {
   N::Value shown_current{};  // the full range of the sensor, for limits; a model's input ends at two bases
   N::Value shown_temperature{};
   N::Value disturbance{};
-  std::int32_t moved = 0;  // counts of the motor's encoder since the tick before
+  std::int32_t moved = 0;  // counts of the motor's encoder since the previous tick
 };
 
 struct Output {

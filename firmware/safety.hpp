@@ -62,7 +62,7 @@ class Safety {
 
  private:
   static constexpr std::int32_t kRail = 32767;  // a reading at this value is not valid
-  // Nearly every check is passed, in a comparison; the rest is not in line with it.
+  // The usual case costs one comparison; the fault is recorded in a function of its own.
   template <class Seen, class Limit>
   static void expect(FaultRecord& found, Fault fault, bool holds, Seen seen, Limit limit) {
     if (!holds) [[unlikely]]
@@ -261,8 +261,8 @@ class Safety {
       check_lag(found, e, last, p, mode);
     }
   }
-  // A lag that is allowed at any speed, so that most ticks need no products: the least part of the window is
-  // 2^-kFollowingFloorLog2 of it, rounded down, and half of that is below it for certain.
+  // A lag that is allowed at any speed, so that most ticks need no multiplication: half of the smallest window, which
+  // is 2^-kFollowingFloorLog2 of the full one, so that rounding does not matter.
   static std::int64_t near_lag(const control::FollowingLimits<N>& limits, const Parameters& p) {
     const std::uint32_t near = magnitude_word(limits.position) >> (kFollowingFloorLog2 + 1);
     return p.loops.velocity_limit.raw < 1 << (kFollowingFloorLog2 + 1) ? 0 : std::int64_t{near} << 16;

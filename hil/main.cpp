@@ -200,7 +200,8 @@ void add_drive(CLI::App& app) {
   command->add_option("--json", options->json, "file for the result; - is standard output");
   command->add_option("--tick-hz", options->tick_hz, "ticks of the drive per second, a multiple of 1000")
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "of the sensors' noise, and of where the motor wakes (default 1)");
+  command->add_option("--seed", options->seed,
+                      "of the sensors' noise, and of the motor's angle at power-on (default 1)");
   command->add_option("--wake-turns", options->wake_turns, "the motor's angle at power-on (default: random within 2)")
       ->check(CLI::Range(-100.0, 100.0));
   command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");

@@ -31,7 +31,7 @@ std::uint32_t on_one_line(std::uint32_t before, std::uint32_t count) {
   return (before & ~1U) | (count >> 1U & 1U);
 }
 
-plant::State woken(const RigSetup& setup) {
+plant::State initial_state(const RigSetup& setup) {
   plant::State state;
   if (setup.start_turns == 0.0) return state;
   state.motor_angle = kTurn * setup.start_turns;
@@ -41,7 +41,7 @@ plant::State woken(const RigSetup& setup) {
 
 }  // namespace
 
-double waking_turns(std::uint64_t seed) {
+double initial_turns(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   return std::uniform_real_distribution<double>(-2.0, 2.0)(random);
 }
@@ -75,7 +75,7 @@ PlantRig::PlantRig(const RigSetup& setup)
       errors_(plant::sensor_errors_of(setup.drive)),
       tick_s_(1.0 / setup.tick_hz),
       plant_steps_(static_cast<int>(std::ceil(tick_s_ / kLongestStepS))),
-      plant_(plant::physics_of(setup.drive), setup.locked, woken(setup)),
+      plant_(plant::physics_of(setup.drive), setup.locked, initial_state(setup)),
       normal_(plant::stream_seed(setup.seed, 0, kSensorNoise)),
       current_noise_a_(noise_of(setup.drive.sensors.current, setup.drive.rated_current_a)),
       torque_noise_nm_(noise_of(setup.drive.sensors.torque, setup.drive.rated_torque_nm)),

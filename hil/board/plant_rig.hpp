@@ -73,8 +73,8 @@ struct RigSetup {
   /// That motor; none: the one whose settings the drive was made with.
   std::optional<ThreePhaseParameters> motor{};
 };
-/// Where a drive of this seed wakes unless it is stated: the motor's angle, within two turns.
-double waking_turns(std::uint64_t seed);
+/// The motor's angle at power-on for this seed, unless it is stated: within two turns.
+double initial_turns(std::uint64_t seed);
 AnalogScales scales_of(const plant::Drive& drive);
 /// What the board of such a drive states about its hardware.
 control::Hardware hardware_of(const plant::Drive& drive,

@@ -54,8 +54,8 @@ class Host {
   bool compensation_;
 };
 
-// The motion, from where the output woke, and after it the hold: from the velocity at its end to rest within a quarter
-// of a second.
+// The motion, from the output's angle at power-on, and after it the hold: from the velocity at its end to rest within a
+// quarter of a second.
 class MotionAndHold {
  public:
   MotionAndHold(const Scenario& motion, double duration_s, double from_rad)
@@ -80,7 +80,7 @@ class MotionAndHold {
   double duration_s_, from_rad_;
 };
 
-// Waits until it has checked its sensors, brings it to the start of the motion unless it woke there, and arms it.
+// Waits until it has checked its sensors, brings it to the start of the motion unless it is there, and arms it.
 // Returns the ticks.
 std::uint32_t begin(VirtualDrive& drive, const Host& host, const Reference& start, std::uint32_t boot_ticks) {
   drive.run(boot_ticks);
@@ -216,7 +216,7 @@ ScenarioResult run_scenario(const ScenarioPlan& plan, std::unique_ptr<Controller
   const std::uint32_t host_ticks = plan.tick_hz / 1000;
   const Scenario motion = plan.motion ? *plan.motion : scenario(plan.scenario);
   ScenarioResult result;
-  result.start_turns = plan.start_turns.value_or(waking_turns(plan.seed));
+  result.start_turns = plan.start_turns.value_or(initial_turns(plan.seed));
   const MotionAndHold motion_and_hold(motion, plan.duration_s, kTurn * result.start_turns / plan.drive.gear_ratio);
   const effects::DriveConstants<double> constants =
       plan.packed ? plan.packed->constants : constants_of(plan.drive, plan.tick_hz);

@@ -79,7 +79,7 @@ struct ScenarioResult {
   std::uint64_t frames = 0;
   std::uint64_t telemetry_hash = 0;
   double wall_s = 0.0;
-  double start_turns = 0.0;  ///< where it woke
+  double start_turns = 0.0;  ///< motor angle at power-on
   firmware::Status end{};
   firmware::FaultRecord first_fault{};  ///< of the drive, even where it continued
   std::vector<TracePoint> trace{};

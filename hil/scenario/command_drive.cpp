@@ -93,7 +93,7 @@ std::string json_of(const ScenarioPlan& plan, const std::vector<ScenarioResult>&
 }
 
 void print(const DriveOptions& options, const ScenarioPlan& plan, const std::vector<ScenarioResult>& runs) {
-  fmt::print("{}: {}, {:g} s at {} ticks a second, {}; the motor woke at {:.4g} turns\n", plan.scenario,
+  fmt::print("{}: {}, {:g} s at {} ticks a second, {}; motor at {:.4g} turns at power-on\n", plan.scenario,
              plan.motion->what, plan.duration_s, plan.tick_hz,
              options.processor_image.empty() ? "software board" : "emulated processor", runs.front().start_turns);
   fmt::print("{:<13} {:>14} {:>14} {:>13} {:>18} {:>9}\n", "compensation", "rms error rad", "peak error",

@@ -24,7 +24,7 @@ std::filesystem::path pairing_file_of(std::filesystem::path flash_file) {
 double start_turns_of(const TwinSetup& setup) {
   if (setup.locked) return 0.0;
   if (setup.start_turns) return *setup.start_turns;
-  return board::waking_turns(setup.seed);
+  return board::initial_turns(setup.seed);
 }
 
 }  // namespace

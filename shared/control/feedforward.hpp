@@ -71,7 +71,7 @@ struct Feedforward {
   };
   template <class N>
   struct State {
-    typename N::Value load{};  // torque through the flexspline, at the tick before
+    typename N::Value load{};  // torque through the flexspline, at the previous tick
     typename N::Value torsion{};
     typename N::State torsion_state{};  // the torsion; its change in a tick may be below the resolution of a value
     typename N::Step lead{};

@@ -54,7 +54,7 @@ struct Loops {
   template <class N>
   struct State {
     typename N::State integral{};
-    typename N::Value torque{};  // of the tick before
+    typename N::Value torque{};  // of the previous tick
     Mode mode = Mode::off;
   };
   // The demand. In mode velocity `velocity` is the set point; in mode position `velocity` is the feedforward of it;

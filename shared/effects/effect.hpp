@@ -30,10 +30,10 @@ enum class Limit : std::uint8_t {
   scale,             // the same, for a positive scale: searched for by its ratio to them
   velocity,          // a motor velocity: above the mask's limit, below a quarter of the fast motion
   travel,            // a motor angle: above the filter's resolution, below the shortest stroke between reversals
-  torsion,           // a torsion: above the resolution of the positions, below a third of the largest torsion
-  corner,            // a torsion at a corner: above the resolution, up to 1.5 times the largest
-  span,              // the whole range of a torsion: from half the largest to 4/3 of it
-  current,           // a current: between a tenth of the largest and the largest
+  torsion,           // a torsion: from 0.3 % of the largest torsion to a third of it
+  corner,            // a torsion at a corner: from 0.3 % of the largest to 1.5 times it
+  span,              // the whole range of a torsion: from half the largest to 1.3 times it
+  current,           // a current: from a quarter of the largest, or the median if that is larger, to the largest
   inverse_velocity,  // one over a motor velocity, from a thousandth of the fast motion's to that of the slowest visible
   inverse_travel,    // one over a motor angle: the inverse of travel
   inverse_torsion,   // one over a torsion: from half the largest torsion's to above the resolution's

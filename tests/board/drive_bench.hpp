@@ -44,10 +44,10 @@ class CellsPort {
 class DriveBench {
  public:
   // `variant`: dac or pwm; dac-abs or dac-index for other encoders. An empty flash memory without `parameters`.
-  // `wakes`: the motor's angle at power-on, turns.
-  explicit DriveBench(const std::string& variant, bool parameters = true, double wakes = 0.7)
+  // `initial_turns`: the motor's angle at power-on, turns.
+  explicit DriveBench(const std::string& variant, bool parameters = true, double initial_turns = 0.7)
       : chip(std::string(FLEXSPLINE_BOARDS) + "/stm32f405/f405-" + variant + ".elf"),
-        rig({.drive = made_for(variant), .seed = 3, .start_turns = wakes, .encoders = kind_of(variant)}),
+        rig({.drive = made_for(variant), .seed = 3, .start_turns = initial_turns, .encoders = kind_of(variant)}),
         is_bridge_(variant == "pwm"),
         drive_(made_for(variant)) {
     if (parameters) store(twin::factory_block(drive_, setup()));

@@ -62,14 +62,14 @@ void arm_velocity(DriveBench& bench, double rad_s) {
 }
 
 TEST(BoardEncoders, OnSpiAndI2cTellTheAnglesFromTheStartWhereverTheDriveWakes) {
-  for (const double wakes : {0.3, -1.4, 20.6}) {
-    DriveBench bench("dac-abs", true, wakes);
+  for (const double initial_turns : {0.3, -1.4, 20.6}) {
+    DriveBench bench("dac-abs", true, initial_turns);
     bench.come_up();
-    EXPECT_EQ(reference_of(bench).knows_turn, true) << wakes;
-    EXPECT_EQ(reference_of(bench).knows_output, true) << wakes;
+    EXPECT_EQ(reference_of(bench).knows_turn, true) << initial_turns;
+    EXPECT_EQ(reference_of(bench).knows_output, true) << initial_turns;
     const Angles shown = angles_of(bench);
-    EXPECT_NEAR(shown.motor, true_turns(bench), 2.0 / 16384) << wakes;
-    EXPECT_NEAR(shown.output, true_turns(bench) / demo().gear_ratio, 2.0 / 4096) << wakes;
+    EXPECT_NEAR(shown.motor, true_turns(bench), 2.0 / 16384) << initial_turns;
+    EXPECT_NEAR(shown.output, true_turns(bench) / demo().gear_ratio, 2.0 / 4096) << initial_turns;
     expect_no_violation(bench.chip);
   }
 }
@@ -154,7 +154,7 @@ TEST(BoardEncoders, AnOutputEncoderThatDoesNotAnswerIsStaleAndComesBack) {
   }
 }
 
-TEST(BoardEncoders, AnIndexPulseTellsTheTurn) {
+TEST(BoardEncoders, AnIndexPulseGivesTheTurn) {
   DriveBench bench("dac-index", true, 0.3);
   bench.come_up();
   EXPECT_FALSE(reference_of(bench).knows_turn);

@@ -118,8 +118,8 @@ TEST(ClosedLoop, NoiseInSetPointsShakesNoDriveAtRest) {
   const plant::Drive demo = plant::demo_plant().drive;
   const auto d = board::constants_of(demo);
   const auto setup = board::setup_of(demo);
-  const double wakes = board::waking_turns(5);
-  board::VirtualDrive drive({.drive = demo, .seed = 5, .start_turns = wakes},
+  const double start = board::initial_turns(5);
+  board::VirtualDrive drive({.drive = demo, .seed = 5, .start_turns = start},
                             board::Block(board::parameters_of(demo, setup), d), {});
   drive.run(100);
   std::mt19937_64 random(6);
@@ -128,7 +128,7 @@ TEST(ClosedLoop, NoiseInSetPointsShakesNoDriveAtRest) {
   command.kind = firmware::Command::Kind::arm;
   command.mode = firmware::Mode::position;
   command.compensate = command.stream = true;
-  command.position = {std::llround(std::ldexp(wakes, 32))};
+  command.position = {std::llround(std::ldexp(start, 32))};
   ASSERT_EQ(drive.command(command).refusal, firmware::Refusal::none);
   command.kind = firmware::Command::Kind::set;
   double lowest = 1e9, highest = -1e9, most_current = 0.0;

@@ -96,7 +96,7 @@ TEST(DiagnoseRuns, AnEffectIsNamedAmongRunsThatDiffer) {
 }
 
 TEST(Complete, AddsWhatIsMissingAndStops) {
-  const Completion done = add_until_complete(runs(0.0, 4, asymmetry), model_of(kPlain), options(), 5);
+  const StepwiseSelection done = add_until_complete(runs(0.0, 4, asymmetry), model_of(kPlain), options(), 5);
   ASSERT_EQ(done.rounds.size(), 2u);
   EXPECT_EQ(done.rounds[0].named.at(0).effect, "viscous_asymmetry");
   EXPECT_NE(done.rounds[1].verdict, Verdict::missing_effect);
@@ -108,7 +108,7 @@ TEST(Complete, DoesNotAddWhatTakesOffAThousandthOfTheFirstFall) {
   // Beside an asymmetry a thousand times as large (by squares), which leaves no doubt of it either.
   const auto both = [](double q, double w) { return 8e-4 * std::abs(w) + 4e-4 * std::cos(5.0 * q); };
   const data::Dataset dataset = runs(0.0, 5, both);
-  const Completion done = add_until_complete(dataset, model_of(kPlain), options(), 5);
+  const StepwiseSelection done = add_until_complete(dataset, model_of(kPlain), options(), 5);
   ASSERT_EQ(done.rounds.size(), 2u);
   EXPECT_FALSE(done.model.find("torque_ripple"));
   const Diagnosis next = diagnose(dataset, done.model, options());

@@ -64,8 +64,8 @@ Seen look(const Bench& bench) {
       .count = 7,
       .channels = {Channel::velocity, Channel::acceleration, Channel::torsion, Channel::output_turns,
                    Channel::output_fraction, Channel::torque, Channel::disturbance}};
-  const double wakes = board::waking_turns(7801);
-  board::VirtualDrive twin({.drive = drive, .seed = 7801, .start_turns = wakes},
+  const double start = board::initial_turns(7801);
+  board::VirtualDrive twin({.drive = drive, .seed = 7801, .start_turns = start},
                            board::Block(board::parameters_of(drive, setup), d), telemetry);
   twin.keep_frames(true);
   twin.run(100);
@@ -76,7 +76,7 @@ Seen look(const Bench& bench) {
     c.kind = kind;
     c.mode = firmware::Mode::position;
     c.compensate = c.stream = true;
-    c.position = {std::llround(std::ldexp(r.position * d.gear_ratio / kTurn + wakes, 32))};
+    c.position = {std::llround(std::ldexp(r.position * d.gear_ratio / kTurn + start, 32))};
     c.velocity = N::value(r.velocity * d.gear_ratio / d.velocity_base);
     c.acceleration = N::value(r.acceleration * d.gear_ratio / d.acceleration_base);
     return c;

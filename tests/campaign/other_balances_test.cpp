@@ -32,16 +32,16 @@ void expect_named(const std::string& hidden, double scale, double friction_varia
   }
 }
 
-TEST(OtherBalances, TellAnErrorOfTheGearFromAWrongZero) {
+TEST(OtherBalances, DistinguishAnErrorOfTheGearFromAWrongZero) {
   expect_named("kinematic_error", 1.0, 0.0);
 }
-TEST(OtherBalances, TellAnErrorOfTheGearWhereFrictionDiffersFromRunToRun) {
+TEST(OtherBalances, IdentifyAnErrorOfTheGearWhereFrictionDiffersFromRunToRun) {
   expect_named("kinematic_error", 1.0, 0.03);
 }
-TEST(OtherBalances, TellASmallErrorOfTheGear) {
+TEST(OtherBalances, IdentifyASmallErrorOfTheGear) {
   expect_named("kinematic_error", 0.5, 0.0);
 }
-TEST(OtherBalances, TellARippleOfTheTorqueSensorFromOneOfTheMotor) {
+TEST(OtherBalances, DistinguishARippleOfTheTorqueSensorFromOneOfTheMotor) {
   expect_named("torque_sensor_ripple", 1.0, 0.0);
 }
 

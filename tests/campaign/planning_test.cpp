@@ -80,15 +80,15 @@ PlannedCase plan_and_record(const Pair& pair, bool first_is_true, std::uint64_t 
   result.before = named(before);
   result.won_before = won(before, result.truth, other);
 
-  planning::PlanRequest question;
-  question.model = &base;
-  question.dataset = &dataset;
-  question.setting = planning::setting_of(base, &dataset);
+  planning::PlanRequest request;
+  request.model = &base;
+  request.dataset = &dataset;
+  request.setting = planning::setting_of(base, &dataset);
   // The drive gives more than its rated current for a while, and did so in these data.
-  question.setting.limits.current_a = question.setting.locked_current_a = demo.drive.current_limit_a;
-  question.setting.limits.load_torque_nm = 5.0;
-  question.sensors = planning::sensors_of(&dataset);
-  const planning::Design design = planning::separate(question, pair.first, pair.second);
+  request.setting.limits.current_a = request.setting.locked_current_a = demo.drive.current_limit_a;
+  request.setting.limits.load_torque_nm = 5.0;
+  request.sensors = planning::sensors_of(&dataset);
+  const planning::Design design = planning::discriminate(request, pair.first, pair.second);
   result.margin_before = design.before->worst();
   result.margin_after = design.after->worst();
   for (const planning::Run& run : design.plan.runs) {
@@ -174,7 +174,7 @@ const std::vector<Pair> kPairs = {
      false},
 };
 
-TEST(Planning, TheMotionPlannedForTwoEffectsTellsThemApart) {
+TEST(Planning, TheMotionPlannedForTwoEffectsDistinguishesThem) {
   struct Case {
     const Pair* pair;
     bool first;

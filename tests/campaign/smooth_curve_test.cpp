@@ -81,9 +81,9 @@ TEST(SmoothCurve, IsTheClosedFormOfThePenalisedLeastSquares) {
     EXPECT_LT((curve.value - expected.tail(24)).norm(), 1e-6);
     // Effective numbers of the curve and the covariance, from the hat matrix.
     const Matrix hat = inverse * (A.transpose() * w2.asDiagonal() * A);
-    EXPECT_NEAR(curve.effective, hat.diagonal().tail(24).sum(), 1e-5);
+    EXPECT_NEAR(curve.effective_degrees_of_freedom, hat.diagonal().tail(24).sum(), 1e-5);
     const Vector residual = m.problem.target - A * expected;
-    const double noise = residual.dot(w2.cwiseProduct(residual)) / (400.0 - 2.0 - curve.effective);
+    const double noise = residual.dot(w2.cwiseProduct(residual)) / (400.0 - 2.0 - curve.effective_degrees_of_freedom);
     EXPECT_LT((curve.covariance - noise * inverse.bottomRightCorner(24, 24)).norm(), 1e-5 * curve.covariance.norm());
     EXPECT_TRUE(curve.left_to.empty());
   }
@@ -109,7 +109,7 @@ TEST(SmoothCurve, LeftOutSquaresAreThoseOfFitsWithoutEachFold) {
 
 TEST(SmoothCurve, SmoothsAStraightLineToTwoNumbersAndABumpToAsManyAsItHas) {
   const auto effective = [](auto law, double noise) {
-    return fit_curve(made(2000, 64, noise, law, 9).problem).effective;
+    return fit_curve(made(2000, 64, noise, law, 9).problem).effective_degrees_of_freedom;
   };
   EXPECT_LT(effective([](double x) { return 2.0 * x - 1.0; }, 0.3), 4.0);
   EXPECT_GT(effective(bump, 0.05), 10.0);

@@ -74,7 +74,7 @@ std::string error_of(const std::function<void()>& act) {
   return "";
 }
 
-TEST(MadeEffects, NamesAndParametersAreReadAsTheyAreWritten) {
+TEST(UserDefinedEffects, NamesAndParametersAreReadAsTheyAreWritten) {
   EXPECT_TRUE(names_user_defined_effect("table_effect:velocity"));
   EXPECT_TRUE(names_user_defined_effect("expression_effect"));
   EXPECT_FALSE(names_user_defined_effect("torque_ripple:2"));
@@ -96,7 +96,7 @@ TEST(MadeEffects, NamesAndParametersAreReadAsTheyAreWritten) {
   EXPECT_EQ(parse_parameter("c").unit, "1");
 }
 
-TEST(MadeEffects, MistakesAreSaidWithWhatIsKnown) {
+TEST(UserDefinedEffects, MistakesAreSaidWithWhatIsKnown) {
   const auto mistake_in = [](const char* text, const UserDefinition& m = {}) {
     return error_of([&] { user_defined_effect(text, m, plain_model()); });
   };

@@ -29,7 +29,7 @@ TEST(SmallOffset, OfTheTorqueSensorIsNamedByTheLoadThatMovesFreely) {
   EXPECT_EQ(named("torque_offset", 0.01, 8402), "torque_offset");
 }
 
-TEST(TorqueScale, OfMotorAndSensorIsNotToldWithoutATorqueThatIsKnown) {
+TEST(TorqueScale, OfMotorAndSensorIsNotIdentifiableWithoutATorqueThatIsKnown) {
   for (const std::string& hidden : tests::part_of({"torque_constant_error", "torque_sensor_gain"})) {
     const std::string names = named(hidden, 1.0, 8403);
     EXPECT_NE(names.find("torque_constant_error"), std::string::npos) << names;

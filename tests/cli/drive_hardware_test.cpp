@@ -60,7 +60,7 @@ stiffness = { value = 6300.0, unit = "N*m/rad" }
       << wrong.err;
 }
 
-TEST(DriveHardware, HomeSaysWhatTheDriveKnowsAndTellsItWhereItsMotorStands) {
+TEST(DriveHardware, HomeSaysWhatTheDriveKnowsAndSetsTheAngleOfItsMotor) {
   const Shell shell;
   const TwinProcess twin({"--serve", "0"});
   const json asked = shell.json("flexspline home --drive " + twin.name());

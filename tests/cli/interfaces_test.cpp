@@ -43,7 +43,7 @@ std::set<std::string> options_in_help(const std::string& help) {
   return options;
 }
 
-TEST(Completion, BashCompletesCommandsOptionsChoicesAndEffects) {
+TEST(StepwiseSelection, BashCompletesCommandsOptionsChoicesAndEffects) {
   const Shell shell;
   shell.must("flexspline completion bash >flexspline.bash");
   EXPECT_EQ(offered(shell, "flexspline ident"), std::set<std::string>{"identify"});
@@ -56,7 +56,7 @@ TEST(Completion, BashCompletesCommandsOptionsChoicesAndEffects) {
   EXPECT_EQ(offered(shell, "flexspline identify --model my"), std::set<std::string>{"my model.toml"});
 }
 
-TEST(Completion, OffersTheOptionsThatHelpListsAndNoOther) {
+TEST(StepwiseSelection, OffersTheOptionsThatHelpListsAndNoOther) {
   const Shell shell;
   shell.must("flexspline completion bash >flexspline.bash");
   for (const char* command : {"demo", "identify", "diagnose", "plan", "pack", "record", "twin", "export", "fleet"}) {
@@ -66,7 +66,7 @@ TEST(Completion, OffersTheOptionsThatHelpListsAndNoOther) {
   }
 }
 
-TEST(Completion, ZshReadsItsScript) {
+TEST(StepwiseSelection, ZshReadsItsScript) {
   const Shell shell;
   if (!is_there(shell, "zsh")) GTEST_SKIP() << "zsh is not installed";
   shell.must("flexspline completion zsh >_flexspline");
@@ -77,7 +77,7 @@ TEST(Completion, ZshReadsItsScript) {
                        "registered _flexspline for flexspline\n_flexspline: function"));
 }
 
-TEST(Completion, FishCompletesFromItsScript) {
+TEST(StepwiseSelection, FishCompletesFromItsScript) {
   const Shell shell;
   if (!is_there(shell, "fish")) GTEST_SKIP() << "fish is not installed";
   shell.must("flexspline completion fish >flexspline.fish");
@@ -92,7 +92,7 @@ TEST(Completion, FishCompletesFromItsScript) {
   EXPECT_TRUE(contains(offers("flexspline identify --method part"), "partitioned"));
 }
 
-TEST(Completion, AnUnknownShellIsRefused) {
+TEST(StepwiseSelection, AnUnknownShellIsRefused) {
   const Shell shell;
   const Answer answer = shell.run("flexspline completion tcsh");
   EXPECT_EQ(answer.code, 2);

@@ -65,7 +65,7 @@ TEST_F(Report, OfCompareHasTheNumbersOfItsJson) {
 }
 
 TEST_F(Report, OfCompareShowsSixteenFreeRunsAndBlackBoxesOnOnePage) {
-  shell_.must("flexspline compare --model fitted.toml demo-out --beside arx:4,4,1 --report all.html --json all.json");
+  shell_.must("flexspline compare --model fitted.toml demo-out --baseline arx:4,4,1 --report all.html --json all.json");
   const std::string page = shell_.file("all.html");
   expect_loads_nothing(page);
   EXPECT_LT(page.size(), 3'000'000u);

@@ -40,6 +40,22 @@ TEST(UnfinishedProject, HoldsWhatWasFoundAndTheLineOnStandardErrorGoesOn) {
   EXPECT_TRUE(fs::exists(shell.folder() / "project/base-model.toml"));
 }
 
+TEST(UnfinishedProject, ADraftThatWasChangedByHandIsNotWrittenOver) {
+  const Shell shell;
+  shell.write("log.csv", log_of("clock,Iq,kappa"));
+  EXPECT_EQ(shell.run("flexspline new --from log.csv --out project").code, 2);
+  const std::string changed = shell.file("project/dataset.toml") + "# checked by hand\n";
+  shell.write("project/dataset.toml", changed);
+  const std::string line =
+      "flexspline new --from log.csv --out project --map time_s=clock --map motor_position_rad=kappa";
+  const Answer answer = shell.run(line);
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_TRUE(contains(answer.err, "project/dataset.toml")) << answer.err;
+  EXPECT_TRUE(contains(answer.err, "--force")) << answer.err;
+  EXPECT_EQ(shell.file("project/dataset.toml"), changed);
+  shell.must(line + " --force");
+}
+
 TEST(UnfinishedProject, MessagesNameLinesOfTheFileThatIsThere) {
   const Shell shell;
   shell.write("log.csv", log_of("time_s,current_a,motor_counts"));

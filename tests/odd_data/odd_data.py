@@ -49,7 +49,7 @@ COMMANDS = {
     "simulate": ("flexspline simulate --model model.toml {data} --out simulated", True),
     "compare": ("flexspline compare --model model.toml {data}", True),
     "sensitivity": ("flexspline sensitivity --model model.toml {data}", True),
-    "beside": ("flexspline compare --model model.toml {data} --beside arx:2,2,1 --report page.html", True),
+    "beside": ("flexspline compare --model model.toml {data} --baseline arx:2,2,1 --report page.html", True),
     "identify": ("flexspline identify {data} --model model.toml --out fitted.toml", True),
     "identify-base": ("flexspline identify {data} --model project/base-model.toml", True),
     "identify-kalman": ("flexspline identify {data} --model model.toml --derivatives kalman", True),

@@ -94,7 +94,7 @@ TEST(Section54, StribeckFrictionContributesOnlyInVerySlowMotion) {
   const double typical = study().in(without, "free 2 Hz", "motor_velocity").growth;
   EXPECT_GT(slow, 0.1);
   EXPECT_LT(typical, 0.02);
-  EXPECT_EQ(study().overall("without stribeck_gaussian", "motor_velocity", "free").most_in, "slow");
+  EXPECT_EQ(study().overall("without stribeck_gaussian", "motor_velocity", "free").worst_experiment, "slow");
   EXPECT_LT(without.growth, study().variant("without coulomb_friction").growth);
 }
 

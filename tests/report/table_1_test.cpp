@@ -119,7 +119,7 @@ FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const estimation::Identific
   return fit_free_run(slow.experiments.front(), partitioned(linear), parameters, 20.0, 2.0);
 }
 
-TEST_F(Table1, TheFreeRunOnTheSlowSawToothTellsAmplitudeAndSpeed) {
+TEST_F(Table1, TheFreeRunOnTheSlowSawToothIdentifiesAmplitudeAndSpeed) {
   const report::DirectionalFriction& truth = kTruth.friction.positive;
   std::vector<std::future<FreeRunFit>> fits;
   for (std::uint64_t seed = 7001; seed < in_campaign<std::uint64_t>(7003, 7005); ++seed) {

@@ -157,7 +157,7 @@ void compare_parameters(const Bench& bench, const std::string& hidden, const sel
 bool finds_all(const Bench& bench, const std::vector<std::string>& hidden) {
   std::multiset<std::string> found, wanted;
   for (const std::string& h : hidden) wanted.insert(as_named(h));
-  const selection::Completion done = selection::add_until_complete(bench.dataset, bench.base, {}, kMostRounds);
+  const selection::StepwiseSelection done = selection::add_until_complete(bench.dataset, bench.base, {}, kMostRounds);
   for (std::size_t round = 0; round + 1 < done.rounds.size(); ++round)
     found.insert(label(done.rounds[round].named.front().effect, done.rounds[round].named.front().order));
   for (const std::string& out : done.removed) found.erase(out);

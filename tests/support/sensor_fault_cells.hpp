@@ -94,7 +94,7 @@ inline SensorFaultOutcome run_cell(const SensorFaultCell& cell, const Block& blo
   constexpr double kRampRadS2 = 200.0, kSettleS = 0.1, kMsS = 1e-3;
   constexpr std::uint32_t kMsTicks = kTickHz / 1000;
   const double way = cell.direction, speed = cell.speed_share * demo_drive().rated_velocity_rad_s;
-  VirtualDrive drive({.drive = cell_drive(cell.load), .seed = 7, .start_turns = board::waking_turns(7)}, block);
+  VirtualDrive drive({.drive = cell_drive(cell.load), .seed = 7, .start_turns = board::initial_turns(7)}, block);
   drive.read_frames(false);
   drive.run(100);
   const plant::State& truth = drive.rig().truth();

@@ -151,7 +151,7 @@ struct StageFaultOutcome {
 inline std::unique_ptr<VirtualDrive> three_phase_drive(const StageFaultCell& cell, const Block& block) {
   auto drive = std::make_unique<VirtualDrive>(RigSetup{.drive = cell_drive(cell.load),
                                                        .seed = cell.seed,
-                                                       .start_turns = board::waking_turns(cell.seed),
+                                                       .start_turns = board::initial_turns(cell.seed),
                                                        .three_phase = true},
                                               block);
   drive->read_frames(false);

@@ -94,7 +94,7 @@ inline std::unique_ptr<VirtualDrive> idle_drive(const control::DriveSetup<double
   controller->state({.motor_encoder = control::SensorKind::absolute, .output_encoder = control::SensorKind::absolute});
   auto drive = std::make_unique<VirtualDrive>(RigSetup{.drive = demo_drive(),
                                                        .seed = seed,
-                                                       .start_turns = board::waking_turns(seed),
+                                                       .start_turns = board::initial_turns(seed),
                                                        .encoders = control::SensorKind::absolute},
                                               demo_block(setup), firmware::TelemetrySetup{}, std::move(controller));
   drive->run(100);

@@ -82,7 +82,7 @@ const Comparison& linear_comparison() {
   return c;
 }
 
-TEST(Beside, OnALinearMotorABlackBoxIsAsGoodAsTheModel) {
+TEST(BlackBoxBaseline, OnALinearMotorABlackBoxIsAsGoodAsTheModel) {
   // Acceleration and velocity of the same instant are all that the balance depends on.
   const BaselineResult* balance = find(linear_comparison(), "fir:1", "motor_balance");
   ASSERT_NE(balance, nullptr);
@@ -99,7 +99,7 @@ TEST(Beside, OnALinearMotorABlackBoxIsAsGoodAsTheModel) {
   EXPECT_NEAR(velocity->largest_pole, std::exp(-kViscous / kInertia * velocity->sample_s), 0.03);
 }
 
-TEST(Beside, HeldOutExperimentsAreJudgedButNotFitted) {
+TEST(BlackBoxBaseline, HeldOutExperimentsAreJudgedButNotFitted) {
   const Comparison& c = linear_comparison();
   const BaselineResult* b = find(c, "fir:1", "motor_balance");
   ASSERT_NE(b, nullptr);
@@ -116,7 +116,7 @@ TEST(Beside, HeldOutExperimentsAreJudgedButNotFitted) {
   EXPECT_GT(after->rmse_holdout, 100.0 * b->rmse_holdout);
 }
 
-TEST(Beside, OnADriveWithDryFrictionTheModelIsBetterByFarWithFewerParameters) {
+TEST(BlackBoxBaseline, OnADriveWithDryFrictionTheModelIsBetterByFarWithFewerParameters) {
   const plant::Drive drive = plant::demo_plant().drive;
   data::Dataset dataset = record(drive,
                                  {plan("slow", plant::Mode::velocity, plant::Waveform::sine, 60.0, 1.0, 4.0),
@@ -146,17 +146,17 @@ TEST(Beside, OnADriveWithDryFrictionTheModelIsBetterByFarWithFewerParameters) {
   EXPECT_EQ(velocities, 2u);
 }
 
-TEST(Beside, WhatCannotBeFittedIsSaidAndTheRestIsThere) {
+TEST(BlackBoxBaseline, WhatCannotBeFittedIsSaidAndTheRestIsThere) {
   const Comparison c = compare(linear_data(), linear_model(), {8.0, true}, boxes({"fir:200", "fir:1"}));
   EXPECT_EQ(find(c, "fir:200", "motor_balance"), nullptr);
   EXPECT_NE(find(c, "fir:1", "motor_balance"), nullptr);
   bool said = false;
   for (const std::string& w : c.warnings)
-    said = said || (w.find("--beside fir:200") != std::string::npos && w.find("motor_balance") != std::string::npos);
+    said = said || (w.find("--baseline fir:200") != std::string::npos && w.find("motor_balance") != std::string::npos);
   EXPECT_TRUE(said);
 }
 
-TEST(Beside, WithoutAnExperimentToFitTheWarningSaysSo) {
+TEST(BlackBoxBaseline, WithoutAnExperimentToFitTheWarningSaysSo) {
   data::Dataset dataset = linear_data();
   for (data::Experiment& e : dataset.experiments) e.role = data::Role::holdout;
   const Comparison c = compare(dataset, linear_model(), {20.0, true}, boxes({"fir:1"}));
@@ -167,7 +167,7 @@ TEST(Beside, WithoutAnExperimentToFitTheWarningSaysSo) {
   EXPECT_TRUE(said);
 }
 
-TEST(Beside, TableAndJsonShowThemAndNothingWhereNoneIsAskedFor) {
+TEST(BlackBoxBaseline, TableAndJsonShowThemAndNothingWhereNoneIsAskedFor) {
   const nlohmann::json j = to_json(linear_comparison());
   ASSERT_FALSE(j["beside"].empty());
   for (const char* key : {"asked",      "black_box",          "signal",        "unit",     "load",
@@ -175,10 +175,10 @@ TEST(Beside, TableAndJsonShowThemAndNothingWhereNoneIsAskedFor) {
                           "nrmse",      "fit_percent",        "rmse_one_step", "rmse_fit", "rmse_holdout",
                           "model_rmse", "model_rmse_holdout", "largest_pole",  "stable",   "experiments"})
     EXPECT_TRUE(j["beside"][0].contains(key)) << key;
-  EXPECT_NE(table(linear_comparison()).find("Beside the model"), std::string::npos);
+  EXPECT_NE(table(linear_comparison()).find("Baseline comparison"), std::string::npos);
   const Comparison plain = compare(linear_data(), linear_model(), {20.0, true});
   EXPECT_TRUE(to_json(plain)["beside"].empty());
-  EXPECT_EQ(table(plain).find("Beside the model"), std::string::npos);
+  EXPECT_EQ(table(plain).find("Baseline comparison"), std::string::npos);
 }
 
 }  // namespace

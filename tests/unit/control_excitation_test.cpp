@@ -344,7 +344,7 @@ TEST(Excitation, OnADriveAgreesWithDouble) {
   EXPECT_GT(all, 0.0);
 }
 
-TEST(Excitation, TellsWhatItCannotPlay) {
+TEST(Excitation, ReportsWhatItCannotPlay) {
   const auto found = [](const ExcitationSetup<double>& setup) {
     OverflowLog::clear();
     Excitation::derive<Fixed>(setup, kBase, drive());

@@ -317,7 +317,7 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
   EXPECT_GT(inside, 5000);
 }
 
-TEST(Loops, TellGainsAndLimitsThatDoNotFit) {
+TEST(Loops, ReportGainsAndLimitsThatDoNotFit) {
   const auto found = [](LoopSetup<double> s) {
     OverflowLog::clear();
     loops<Fixed>(s);

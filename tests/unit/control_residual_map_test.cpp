@@ -170,7 +170,7 @@ TEST(ResidualMap, ResetEmptiesItAndEveryChangeShowsInItsVersion) {
   EXPECT_EQ(bin.squares, 0u);
 }
 
-TEST(ResidualMap, TellsSetupsThatDoNotFit) {
+TEST(ResidualMap, ReportsSetupsThatDoNotFit) {
   OverflowLog::clear();
   made();
   EXPECT_EQ(OverflowLog::count(), 0);

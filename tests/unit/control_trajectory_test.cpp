@@ -211,7 +211,7 @@ TEST(Trajectory, OnADriveAgreesWithDouble) {
   EXPECT_GT(fastest, 0.74);
 }
 
-TEST(Trajectory, TellsLimitsThatItCannotKeepTo) {
+TEST(Trajectory, ReportsLimitsThatItCannotKeepTo) {
   for (const auto& [velocity, acceleration] : {std::pair{100.0, 1e-9}, {0.0, 100.0}, {100.0, 0.1}, {1e6, 1e6}}) {
     OverflowLog::clear();
     limits(velocity, acceleration);

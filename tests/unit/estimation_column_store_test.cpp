@@ -70,7 +70,7 @@ Terms terms_with(std::initializer_list<const char*> names) {
   return terms;
 }
 
-TEST(ColumnKey, TellsNonlinearValuesApartAndNotLinearOnes) {
+TEST(ColumnKey, DistinguishesNonlinearValuesAndNotLinearOnes) {
   Terms terms = terms_with({"stribeck_gaussian"});
   const std::size_t velocity = terms[0].entry->index_of("velocity");
   terms[0].values[velocity] = 1.0;

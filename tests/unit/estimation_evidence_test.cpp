@@ -55,9 +55,9 @@ TEST(CombinedEvidence, IsWhatOneFitOfBothWouldFind) {
     const Eigen::Vector2d b(1.5, -0.7);
     const Balance own = balance(random, 200, b, 0.3), other = balance(random, 80, b, 0.05);
     const Whole alone = fit({own}, 2), both = fit({own, other}, 2), there = fit({other}, 2);
-    const Evidence evidence =
-        evidence_of(other.shared, other.own, other.y - other.shared * alone.b,
-                    Eigen::VectorXd(Eigen::VectorXd::Constant(other.y.size(), 1.0 / other.noise)), 1.0);
+    const ScoreAndInformation evidence =
+        score_and_information(other.shared, other.own, other.y - other.shared * alone.b,
+                              Eigen::VectorXd(Eigen::VectorXd::Constant(other.y.size(), 1.0 / other.noise)), 1.0);
     const CombinedEstimate found = combine(scaled_inverse(alone.covariance), evidence);
     EXPECT_LT((alone.b + found.change - both.b).norm(), 1e-9 * both.b.norm());
     EXPECT_LT((found.covariance - both.covariance).norm(), 1e-9 * both.covariance.norm());
@@ -76,8 +76,8 @@ TEST(CombinedEvidence, ABalanceThatDoesNotShowTheParametersChangesNothing) {
   const Eigen::Vector2d b(1.0, 2.0);
   const Balance own = balance(random, 100, b, 0.1), other = balance(random, 100, b, 0.1);
   const Whole alone = fit({own}, 2);
-  const Evidence evidence =
-      evidence_of(Eigen::MatrixXd::Zero(100, 2), other.own, other.y, Eigen::VectorXd(Eigen::VectorXd::Ones(100)), 1.0);
+  const ScoreAndInformation evidence = score_and_information(Eigen::MatrixXd::Zero(100, 2), other.own, other.y,
+                                                             Eigen::VectorXd(Eigen::VectorXd::Ones(100)), 1.0);
   const CombinedEstimate found = combine(scaled_inverse(alone.covariance), evidence);
   EXPECT_EQ(found.change.norm(), 0.0);
   EXPECT_EQ(found.cost, 0.0);
@@ -89,9 +89,9 @@ TEST(CombinedEvidence, RowsThatGoTogetherCountAsOne) {
   const Eigen::Vector2d b(1.0, 2.0);
   const Balance other = balance(random, 100, b, 0.1);
   const Eigen::VectorXd weights = Eigen::VectorXd::Constant(100, 10.0);
-  const Evidence once = evidence_of(other.shared, other.own, other.y, weights, 1.0);
-  const Evidence together = evidence_of(other.shared, other.own, other.y, weights, 4.0);
-  EXPECT_LT((once.slope - 4.0 * together.slope).norm(), 1e-9 * once.slope.norm());
+  const ScoreAndInformation once = score_and_information(other.shared, other.own, other.y, weights, 1.0);
+  const ScoreAndInformation together = score_and_information(other.shared, other.own, other.y, weights, 4.0);
+  EXPECT_LT((once.score - 4.0 * together.score).norm(), 1e-9 * once.score.norm());
   EXPECT_LT((once.information - 4.0 * together.information).norm(), 1e-9 * once.information.norm());
 }
 

@@ -324,7 +324,7 @@ TEST(Identify, WhatTheDataCannotTellIsLeftAtZeroWithAWarning) {
   EXPECT_TRUE(warns_of(*found, "torque_bias.torque cannot be distinguished from coulomb_friction"));
 }
 
-TEST(Identify, ARecordWithTheDriveOffTellsAnOffsetFromAnAsymmetry) {
+TEST(Identify, ARecordWithTheDriveOffDistinguishesAnOffsetFromAnAsymmetry) {
   constexpr double kBias = 0.006, kOdd = 0.004;
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0.0, 1e-4);

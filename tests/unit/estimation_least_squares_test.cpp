@@ -173,7 +173,7 @@ TEST(NeweyWest, GivesTheCovarianceOfStatsmodels) {
 TEST(RecordWeights, AreOneOverTheNoiseOfEachRecordAndBoundedForASilentOne) {
   Eigen::VectorXd residual(12);
   residual << 2, -2, 2, -2, 0.5, 0.5, -0.5, 0.5, 0, 0, 0, 0;
-  const Eigen::VectorXd weights = record_weights({{0, 0, 4}, {1, 4, 8}, {2, 8, 12}}, residual);
+  const Eigen::VectorXd weights = root_record_weights({{0, 0, 4}, {1, 4, 8}, {2, 8, 12}}, residual);
   for (Eigen::Index k = 0; k < 4; ++k) {
     EXPECT_DOUBLE_EQ(weights[k], 0.5);
     EXPECT_DOUBLE_EQ(weights[4 + k], 2.0);
@@ -182,7 +182,7 @@ TEST(RecordWeights, AreOneOverTheNoiseOfEachRecordAndBoundedForASilentOne) {
 }
 
 TEST(RecordWeights, AreAllAlikeWhereThereIsNoNoise) {
-  EXPECT_EQ(record_weights({{0, 0, 3}, {1, 3, 6}}, Eigen::VectorXd::Zero(6)), ones(6));
+  EXPECT_EQ(root_record_weights({{0, 0, 3}, {1, 3, 6}}, Eigen::VectorXd::Zero(6)), ones(6));
 }
 
 TEST(AutocorrelationTimeOfRecords, IsThatOfAFirstOrderProcessAndOneForWhiteNoise) {

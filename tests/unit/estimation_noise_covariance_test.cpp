@@ -21,7 +21,7 @@ struct Errors {
     for (int k = 0; k < 5; ++k) first(k, 0) = 2.0 + k;
     for (int k = 0; k < 7; ++k) second.row(k) << 0.3 * k - 1.0, 4.0 - k * k;
   }
-  NoiseCovariance whitening() const {
+  NoiseCovariance error_covariance() const {
     NoiseCovariance w(root_weights);
     w.add_random_effects(records[0], first);
     w.add_random_effects(records[1], second);
@@ -47,7 +47,7 @@ TEST(NoiseCovariance, MakesTheCovarianceOfTheErrorsTheIdentity) {
   const Errors e;
   const Eigen::MatrixXd unweighted =
       e.root_weights.cwiseInverse().asDiagonal() * e.covariance() * e.root_weights.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd W = e.whitening() * Eigen::MatrixXd::Identity(12, 12);
+  const Eigen::MatrixXd W = e.error_covariance().whiten(Eigen::MatrixXd::Identity(12, 12));
   EXPECT_LT((W * unweighted * W.transpose() - Eigen::MatrixXd::Identity(12, 12)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
@@ -55,7 +55,7 @@ TEST(NoiseCovariance, ScoreColumnsAreTheInverseOfTheCovarianceTimesThem) {
   const Errors e;
   const Eigen::MatrixXd X = some_rows(3);
   const Eigen::MatrixXd expected = e.covariance().inverse() * e.root_weights.asDiagonal() * X;
-  EXPECT_LT((e.whitening().score_columns(X) - expected).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((e.error_covariance().score_columns(X) - expected).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 TEST(NoiseCovariance, CountsWhiteRowsAsOftenAsTheyAreDrawn) {
@@ -64,7 +64,8 @@ TEST(NoiseCovariance, CountsWhiteRowsAsOftenAsTheyAreDrawn) {
   Eigen::VectorXd counts = Eigen::VectorXd::Ones(12);
   counts[3] = 0.0;
   counts[7] = 2.0;
-  const Eigen::MatrixXd once = e.whitening() * X, counted = e.whitening().with_counts(counts) * X;
+  const Eigen::MatrixXd once = e.error_covariance().whiten(X),
+                        counted = e.error_covariance().with_counts(counts).whiten(X);
   EXPECT_LT((counted - counts.asDiagonal() * once).cwiseAbs().maxCoeff(), 1e-15);
 }
 
@@ -77,7 +78,7 @@ TEST(GeneralisedLeastSquares, IsThatOfTheDenseCovariance) {
   const Eigen::MatrixXd normal = weighted.transpose() * inverse * weighted;
   const Eigen::VectorXd expected =
       normal.ldlt().solve(weighted.transpose() * inverse * (e.root_weights.asDiagonal() * y));
-  const LinearFit fit = least_squares(X, y, e.whitening());
+  const LinearFit fit = generalised_least_squares(X, y, e.error_covariance());
   EXPECT_LT((fit.theta - expected).norm(), 1e-10 * expected.norm());
   EXPECT_LT((fit.unit_covariance - normal.inverse()).norm(), 1e-9 * normal.inverse().norm());
   EXPECT_LT((fit.residual - (y - X * expected)).norm(), 1e-10);

@@ -176,12 +176,12 @@ TEST(NoiseCovarianceOfOneRecord, MakesTheDenseCovarianceTheIdentity) {
   MatrixXd common(5, 2);
   for (double& w : root) w = 1.0 + 0.5 * std::abs(normal(random));
   for (double& c : common.reshaped()) c = 3.0 * normal(random);
-  NoiseCovariance whitening(root);
-  whitening.add_random_effects({0, 4, 9}, common);
+  NoiseCovariance error_covariance(root);
+  error_covariance.add_random_effects({0, 4, 9}, common);
   MatrixXd inner = MatrixXd::Identity(12, 12);
   inner.block(4, 4, 5, 5) += common * common.transpose();
   const MatrixXd inverse = root.cwiseInverse().asDiagonal();
-  const MatrixXd W = whitening * MatrixXd::Identity(12, 12);
+  const MatrixXd W = error_covariance.whiten(MatrixXd::Identity(12, 12));
   EXPECT_LT((W * (inverse * inner * inverse) * W.transpose() - MatrixXd::Identity(12, 12)).norm(), 1e-10);
 }
 

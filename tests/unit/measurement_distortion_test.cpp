@@ -159,7 +159,7 @@ TEST(Distortion, CannotBeDistinguishedWhereEvenLinesAreExcited) {
   EXPECT_NE(d.odd_why_not.find("even lines"), std::string::npos);
 }
 
-TEST(Distortion, WithoutLeftOutLinesTellsTheEvenOneAlone) {
+TEST(Distortion, WithoutLeftOutLinesReportsTheEvenOneAlone) {
   const Distortion d = distortion_in(tests::multisine(kHighest, 0.1, 5, true, false), 0.1, 0.1, 1e-4);
   EXPECT_FALSE(d.odd.has_value());
   EXPECT_NE(d.odd_why_not.find("left out"), std::string::npos);

@@ -188,7 +188,7 @@ Ripple ripple_at(double velocity) {
 
 // It is learnt at every eighth tick, and taken out as it is at the next one, up to six ticks away: at 100 rad/s less
 // than a tenth of a radian of its phase.
-TEST(RippleOfTheTorqueSensor, IsTakenOutOfWhatTheDriveTellsAtEverySpeed) {
+TEST(RippleOfTheTorqueSensor, IsTakenOutOfWhatTheDriveReportsAtEverySpeed) {
   for (const double velocity : {20.0, 100.0}) {
     const Ripple ripple = ripple_at(velocity);
     RecordProperty("told", std::to_string(ripple.told / ripple.true_one));

@@ -52,7 +52,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text.replace(text.find(what), what.size(), by);
 }
 
-TEST(ModelFileOfMadeEffects, ReadsTablesAndFormulas) {
+TEST(ModelFileOfUserDefinedEffects, ReadsTablesAndFormulas) {
   const Model model = parsed(kTable).model;
   ASSERT_EQ(model.effects.size(), 2U);
   const Effect& tooth = *model.find("tooth");
@@ -76,7 +76,7 @@ TEST(ModelFileOfMadeEffects, ReadsTablesAndFormulas) {
   EXPECT_FALSE(seal.find("b")->value);
 }
 
-TEST(ModelFileOfMadeEffects, ErrorsNameTheLine) {
+TEST(ModelFileOfUserDefinedEffects, ErrorsNameTheLine) {
   const auto error = [](const char* what, const char* by) { return error_of(replaced(kTable, what, by)); };
   EXPECT_EQ(error("\"motor_angle\"", "\"motor_angel\""),
             "m.toml:7: there is no signal \"motor_angel\"; did you mean \"motor_angle\"?");
@@ -106,12 +106,12 @@ TEST(ModelFileOfMadeEffects, ErrorsNameTheLine) {
   EXPECT_NE(error("times_direction = true", "points = 4").find("[[effect]] has no key \"points\""), std::string::npos);
 }
 
-TEST(ModelFileOfMadeEffects, RewriteLeavesEveryByteOfWhatDoesNotChange) {
+TEST(ModelFileOfUserDefinedEffects, RewriteLeavesEveryByteOfWhatDoesNotChange) {
   const ModelFile file = parsed(kTable);
   EXPECT_EQ(rewrite(file, file.model), file.text);
 }
 
-TEST(ModelFileOfMadeEffects, NumbersAreReplacedOneByOneAndCommentsStay) {
+TEST(ModelFileOfUserDefinedEffects, NumbersAreReplacedOneByOneAndCommentsStay) {
   const ModelFile file = parsed(kTable);
   Model changed = file.model;
   changed.find("tooth")->definition->table.value = {0.001, 0.0213456789, 0.002, 0.0};
@@ -123,7 +123,7 @@ TEST(ModelFileOfMadeEffects, NumbersAreReplacedOneByOneAndCommentsStay) {
   EXPECT_EQ(rewrite(file, changed), expected);
 }
 
-TEST(ModelFileOfMadeEffects, AnotherNumberOfPointsRewritesTheLists) {
+TEST(ModelFileOfUserDefinedEffects, AnotherNumberOfPointsRewritesTheLists) {
   const ModelFile file = parsed(kTable);
   Model changed = file.model;
   Table& table = changed.find("tooth")->definition->table;
@@ -137,7 +137,7 @@ TEST(ModelFileOfMadeEffects, AnotherNumberOfPointsRewritesTheLists) {
   EXPECT_EQ(parsed(text).model.find("tooth")->definition->table.value, table.value);
 }
 
-TEST(ModelFileOfMadeEffects, TableWithoutPointsGetsThemBelowItsOwnEffect) {
+TEST(ModelFileOfUserDefinedEffects, TableWithoutPointsGetsThemBelowItsOwnEffect) {
   const std::string blank =
       "format = \"flexspline-model/1\"\n\n[[effect]]\ntype = \"table_effect\"\nvariable = \"velocity\"  # all of it\n\n"
       "[[effect]]\ntype = \"inertia\"\n";
@@ -152,7 +152,7 @@ TEST(ModelFileOfMadeEffects, TableWithoutPointsGetsThemBelowItsOwnEffect) {
   EXPECT_TRUE(read.effects[0].definition->table.fixed);
 }
 
-TEST(ModelFileOfMadeEffects, NewFilesHoldThem) {
+TEST(ModelFileOfUserDefinedEffects, NewFilesHoldThem) {
   const Model model = parsed(kTable).model;
   const Model read = parsed(write(model)).model;
   EXPECT_EQ(read.find("tooth")->definition->table.value, model.find("tooth")->definition->table.value);

@@ -26,13 +26,17 @@ TEST(DiagnosisAnswer, SaysOfWhatTheDataCannotTellWhyAndWhatToRecord) {
   }
   std::string text = ::testing::internal::GetCapturedStdout();
   for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");  // unwrapped
-  EXPECT_NE(text.find("Cannot tell whether dahl_friction is missing: chosen in 51 of 100 subsamples; 60 are needed. "
-                      "What would tell: small slow motion that reverses often."),
-            std::string::npos)
+  EXPECT_NE(
+      text.find(
+          "These data do not decide whether dahl_friction is missing: chosen in 51 of 100 subsamples; 60 are needed. "
+          "To decide, record: small slow motion that reverses often."),
+      std::string::npos)
       << text;
-  EXPECT_NE(text.find("Cannot tell whether torque_ripple (2 per turn) or load_scaled_ripple (2 per turn) is missing; "
-                      "too few. What would tell: "),
-            std::string::npos)
+  EXPECT_NE(
+      text.find(
+          "These data do not decide whether torque_ripple (2 per turn) or load_scaled_ripple (2 per turn) is missing; "
+          "too few. To decide, record: "),
+      std::string::npos)
       << text;
 }
 

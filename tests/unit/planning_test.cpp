@@ -142,7 +142,7 @@ PlanRequest request_for(const model::Model& model) {
 TEST(Planning, AnOffsetOfTheSensorIsToldFromAsymmetryWithTheDriveOff) {
   const model::Model m = a_drive();
   const PlanRequest q = request_for(m);
-  const Design d = separate(q, "current_offset", "coulomb_asymmetry");
+  const Design d = discriminate(q, "current_offset", "coulomb_asymmetry");
   EXPECT_TRUE(
       std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.mode == Mode::off; }));
   EXPECT_GT(d.after->worst(), kDistinguished);
@@ -158,7 +158,7 @@ TEST(Planning, WithoutTheDriveOffTheSameTwoAreOneClass) {
   const model::Model m = a_drive();
   PlanRequest q = request_for(m);
   q.setting.off = q.setting.locked = q.setting.external_load = false;
-  const Design d = separate(q, "current_offset", "coulomb_asymmetry");
+  const Design d = discriminate(q, "current_offset", "coulomb_asymmetry");
   EXPECT_LT(d.after->worst(), kDistinguished);
   EXPECT_TRUE(d.plan.runs.empty());
   ASSERT_FALSE(d.plan.notes.empty());
@@ -167,7 +167,7 @@ TEST(Planning, WithoutTheDriveOffTheSameTwoAreOneClass) {
 
 TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
   const model::Model m = a_drive();
-  const Design d = excite(request_for(m));
+  const Design d = d_optimal(request_for(m));
   EXPECT_TRUE(std::any_of(d.plan.runs.begin(), d.plan.runs.end(), [](const planning::Run& r) { return r.locked; }));
   for (const Precision& p : d.parameters) {
     ASSERT_TRUE(p.percent_after.has_value()) << p.id;
@@ -175,12 +175,12 @@ TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
   }
 }
 
-TEST(Planning, ACurrentThatMovesNothingTellsNothing) {
+TEST(Planning, ACurrentThatMovesNothingShowsNothing) {
   const model::Model m = a_drive();
   PlanRequest q = request_for(m);
   q.setting.limits.current_a = 0.01;
   q.setting.off = q.setting.locked = q.setting.external_load = false;
-  const Design d = separate(q, "viscous_asymmetry", "coulomb_asymmetry");
+  const Design d = discriminate(q, "viscous_asymmetry", "coulomb_asymmetry");
   EXPECT_LT(d.after->worst(), kDistinguished);
   EXPECT_TRUE(d.plan.runs.empty());
 }

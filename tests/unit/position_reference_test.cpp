@@ -91,7 +91,7 @@ TEST(PositionReference, CountersThatBeginAtZeroKnowNothingUntilTheHostSaysWhereT
   EXPECT_EQ(drive->command(home_at(0.0)).refusal, Refusal::armed);
 }
 
-TEST(PositionReference, AnIndexPulseTellsTheMotorsTurnOnceTheShaftPassedItAndStands) {
+TEST(PositionReference, AnIndexPulseGivesTheMotorsTurnOnceTheShaftPassedItAndStands) {
   for (const double wake : {0.3, -0.4, 0.05}) {
     const auto drive = woken(demo_drive(), wake, SensorKind::indexed);
     EXPECT_FALSE(drive->status().knows_turn);

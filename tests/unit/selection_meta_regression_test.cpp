@@ -168,14 +168,14 @@ TEST(PermutationTest, OfRecordsThatIdentifyDifferentParametersIsSeldomWrong) {
     RecordsWithLaw r(24, 0.0, 3000 + seed);
     r.theta.topRows(10).col(1).array() += 2.0;
     const RecordParameters records = two_kinds(r, 10);
-    wrong += permutation_p_value(records, {r.added}, {whole_of(records)}, 400, seed) <= 0.05;
+    wrong += permutation_p_value(records, {r.added}, {every_record(records)}, 400, seed) <= 0.05;
   }
   EXPECT_LT(wrong, 11);  // 5 are expected
 }
 
 TEST(PermutationTest, IsOneWhereNoLawIsPossible) {
   const RecordsWithLaw r(10, 1.0, 9);
-  EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, {whole_of(exact(r.theta))}, 100, 1), 1.0);
+  EXPECT_EQ(permutation_p_value(exact(r.theta), {MatrixXd(-r.added)}, {every_record(exact(r.theta))}, 100, 1), 1.0);
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ TEST(TimeLag, IsTheOneThatWasPutInWithinItsStandardError) {
   for (const double lag_s : {-9e-3, -1e-3, 0.0, 2.5e-3, 7e-3}) {
     const auto lag = estimate_time_lag(sines(lag_s, 0.1, 1), {0}, Direction::sign, LagRange::longest, {});
     ASSERT_TRUE(lag) << lag_s;
-    EXPECT_NEAR(lag->seconds, lag_s, 4.0 * lag->std + 2e-5) << lag_s;
+    EXPECT_NEAR(lag->lag_s, lag_s, 4.0 * lag->std_s + 2e-5) << lag_s;
   }
 }
 
@@ -66,9 +66,9 @@ TEST(TimeLag, StandardErrorIsThatOverManyNoises) {
   for (unsigned seed = 0; seed < kRuns; ++seed) {
     const auto lag = estimate_time_lag(sines(3e-3, 0.3, 100 + seed), {0}, Direction::sign, LagRange::longest, {});
     ASSERT_TRUE(lag);
-    sum += lag->seconds;
-    squares += lag->seconds * lag->seconds;
-    stated += lag->std / kRuns;
+    sum += lag->lag_s;
+    squares += lag->lag_s * lag->lag_s;
+    stated += lag->std_s / kRuns;
   }
   const double std = std::sqrt(squares / kRuns - sum * sum / kRuns / kRuns);
   // Of 60 runs a standard deviation is known within 9 %.
@@ -79,11 +79,11 @@ TEST(TimeLag, TakenOffItLeavesNone) {
   RegressorTable table = sines(6e-3, 0.02, 2);
   const auto before = estimate_time_lag(table, {0}, Direction::sign, LagRange::longest, {});
   ASSERT_TRUE(before);
-  EXPECT_GT(before->share, 0.9);
-  take_off_lag(table, before->seconds);
+  EXPECT_GT(before->reduction_share, 0.9);
+  correct_time_lag(table, before->lag_s);
   const auto after = estimate_time_lag(table, {0}, Direction::sign, LagRange::longest, {});
   ASSERT_TRUE(after);
-  EXPECT_NEAR(after->seconds, 0.0, 1e-4);
+  EXPECT_NEAR(after->lag_s, 0.0, 1e-4);
 }
 
 // Four rows are 16 ms.
@@ -91,7 +91,7 @@ TEST(TimeLag, LongerThanUsualIsFoundUpToTheLongestOfAnAmplifier) {
   for (const double lag_s : {-22e-3, 21e-3}) {
     const auto lag = estimate_time_lag(sines(lag_s, 0.1, 4), {0}, Direction::sign, LagRange::longest, {});
     ASSERT_TRUE(lag) << lag_s;
-    EXPECT_NEAR(lag->seconds, lag_s, 4.0 * lag->std + 1e-4) << lag_s;
+    EXPECT_NEAR(lag->lag_s, lag_s, 4.0 * lag->std_s + 1e-4) << lag_s;
     EXPECT_FALSE(estimate_time_lag(sines(lag_s, 0.1, 4), {0}, Direction::sign, LagRange::usual, {}));
   }
 }

@@ -224,7 +224,7 @@ TEST(Sensitivity, OverExperimentsOneGainFitsAllSines) {
   }
   expect_response(v.find("motor_velocity", "free")->response, across / squared);
   // Friction matters most where the inertia does least.
-  EXPECT_EQ(v.find("motor_velocity", "free")->most_in, motor_data({1.0}).experiments[0].name);
+  EXPECT_EQ(v.find("motor_velocity", "free")->worst_experiment, motor_data({1.0}).experiments[0].name);
 }
 
 TEST(Sensitivity, AModelThatDivergesComesFirstAndHasNoError) {

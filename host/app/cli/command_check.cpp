@@ -106,7 +106,7 @@ json findings_json(const std::vector<data::Finding>& findings) {
 }
 
 void print(const std::vector<data::Finding>& findings, Console& console) {
-  console.line(console.bold(findings.empty() ? "Nothing was found wrong." : "Findings"));
+  console.line(console.bold(findings.empty() ? "No problems were found." : "Findings"));
   for (const data::Finding& f : findings)
     console.line(output::wrapped(fmt::format("{} ({}): {}", severity_name(f.severity), f.kind, f.text()), 2, 2));
   console.line();
@@ -171,7 +171,7 @@ Command check_command() {
        "what is in the data: signals, rates, noise, excitation, findings",
        "Reads measurements and lists what each experiment holds: signals with their range, noise and smallest "
        "step, motion, reversals, a period if it repeats itself; then each problem and its remedy, "
-       " what can be identified from these signals, and which filters would be used.",
+       "what can be identified from these signals, and which filters would be used.",
        {kMakeData, "flexspline check demo-out"}},
       declare, run);
 }

@@ -54,7 +54,8 @@ DriveFacts facts_of(drive::Session& session, const CommissionOptions& options) {
   b.hardware = session.hardware();
   b.active = session.read_block(protocol::Which::active);
   if (options.store && b.active.empty())
-    session.fail("it has no parameter block that could keep the motor; flash one first, or leave --store out");
+    session.fail(
+        "it has no parameter block in which the motor's data could be stored; flash one first, or leave --store out");
   std::optional<double> motor_a;
   if (const auto scales = drive::scales_of(b.active)) {
     motor_a = std::ldexp(scales->header.limits.current.raw, -fixed::kValueBits) * scales->constants.current_base;

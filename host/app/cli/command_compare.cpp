@@ -70,7 +70,7 @@ int run(const CompareOptions& options, Console& console) {
   try {
     for (const std::string& text : options.baselines) baselines.push_back(blackbox::parse_specification(text));
   } catch (const std::invalid_argument& wrong) {
-    throw UsageError(fmt::format("--beside {}", wrong.what()));
+    throw UsageError(fmt::format("--baseline {}", wrong.what()));
   }
   require_report_place(options.report);
   const model::ModelFile file = load_model(options.model);
@@ -104,8 +104,8 @@ void declare(Parser& parser, CompareOptions& options) {
       .value("SIGNAL=RMSE")
       .one_value_each_time();
   parser
-      .option("--beside", options.baselines,
-              "a black box to compare the model with: fir:N, arx:NA,NB,NK, or fir:auto, arx:auto; may be repeated")
+      .option("--baseline,--beside", options.baselines,
+              "fit a black box as a baseline: fir:N, arx:NA,NB,NK, or fir:auto, arx:auto; may be repeated")
       .value("BOX")
       .one_value_each_time();
   take_report(parser, options.report);
@@ -119,12 +119,13 @@ Command compare_command() {
       {"compare",
        "model against measurement, by experiment, signal and region",
        "Compares in both directions: the torque that the model needs for the measured motion (the balances), and the "
-       "motion that it predicts from the measured torque (free run). Errors are shown with the noise of the "
+       "motion that it predicts from the motor's current or torque alone (free run). Errors are shown with the noise "
+       "of the "
        "measurement where that is known; the regions with the largest excess over it are named. --limit sets a "
-       "limit: exit code 1 where a signal's error is above it. --beside fits a linear black box (FIR or ARX) to the "
+       "limit: exit code 1 where a signal's error is above it. --baseline fits a linear black box (FIR or ARX) to the "
        "same signals, on the experiments that are not held out, and shows what error its many parameters reach. "
        "--report writes a page with plots of all of it.",
-       {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out --beside arx:4,4,1"}},
+       {kMakeData, kIdentify, "flexspline compare --model fitted.toml demo-out --baseline arx:4,4,1"}},
       declare, run);
 }
 

@@ -68,10 +68,11 @@ int run(const DiagnoseOptions& options, Console& console) {
     }
     output::print_diagnosis(console, found, add_command(options));
   };
-  const selection::Completion done =
+  const selection::StepwiseSelection done =
       selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, print);
   for (const std::string& effect : done.removed)
-    console.line(fmt::format("{} was needless once the others were in the model, and was removed.", effect));
+    console.line(fmt::format(
+        "{} was removed: with the other effects in the model it no longer reduces the error significantly.", effect));
   write_page(options, dataset, file.model, done.model, done.rounds, console);
   output::save_json(options.json, options.all ? output::rounds_json(done.rounds, done.removed)
                                               : output::diagnosis_json(done.rounds.front()));

@@ -158,7 +158,8 @@ int run(const RestoreOptions& options, Console& console) {
     const drive::Unlocked unlocked(session, signer);
     session.restore();
   }
-  console.line(restores ? "Restored and in use; another restore goes forth again." : "Nothing was changed.");
+  console.line(restores ? "Restored and in use; another restore returns to the block that was active before."
+                        : "Nothing was changed.");
   output::save_json(options.json, {{"format", "flexspline-restore/1"},
                                    {"drive", json_of(session)},
                                    {"before", json_of(before)},
@@ -178,7 +179,7 @@ void declare(Parser& parser, FlashOptions& options) {
       .value("FILE.toml");
   parser.option("--firmware", options.firmware, "firmware image of flexspline image, over USB").value("IMAGE");
   parser.flag("--older", options.older, "with --firmware: an image older than what the drive has");
-  parser.option("--draws", options.draws, "simulated drives of the prediction; 0: none")
+  parser.option("--draws", options.draws, "random parameter sets drawn for the predicted error; 0: no prediction")
       .one_of_numbers({0, 3, 4, 5, 6, 8, 12, 20})
       .shows_default();
   parser.flag("--measured", options.measured, "as in pack --measured");

@@ -173,7 +173,7 @@ int run_drives(const FleetOptions& options, Console& console) {
 
 std::string in_words(const fleet::Difference& d) {
   return fmt::format(
-      "{}: {} is {}, {} the median {} of its siblings by {} times {} (their scatter or, where that is larger, its own "
+      "{}: {} is {}, {} the median of the other drives ({}), by {} times {} (the larger of their scatter and its own "
       "uncertainty).",
       d.drive, d.name, output::with_unit(d.value, d.unit), d.z > 0.0 ? "above" : "below",
       output::with_unit(d.median, d.unit), output::number(std::abs(d.z), 3), output::with_unit(d.deviation, d.unit));

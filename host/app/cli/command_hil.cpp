@@ -64,7 +64,7 @@ void print(const Comparison& c, Console& console) {
                   "integrator of {:.3g} 1/s, position {:.3g} Hz.",
                   c.seconds, c.processor.empty() ? "the software board" : "an emulated processor", c.tick_hz,
                   c.velocity_loop_hz, c.integrator_per_s, c.position_loop_hz)));
-  output::Table table({"compensation", "rms error", "peak error", "unit", "of none", "predicted", "95 % interval",
+  output::Table table({"compensation", "rms error", "peak error", "unit", "ratio to none", "predicted", "95 % interval",
                        "rms current", "peak", "unit", "what happened"},
                       "lrrlrrrrrll");
   for (const ComparedRun& run : c.runs) {
@@ -110,7 +110,9 @@ void declare(Parser& parser, HilOptions& options) {
       .value("FILE.toml");
   parser.option("--seconds", options.seconds, "duration of the motion (default: the scenario's)").value("S");
   parser.option("--processor", options.processor, "firmware image that runs the controller, in QEMU").value("ELF");
-  parser.option("--draws", options.draws, "simulated drives of the prediction; 0: none").shows_default().value("N");
+  parser.option("--draws", options.draws, "random parameter sets drawn for the predicted error; 0: no prediction")
+      .shows_default()
+      .value("N");
   parser.option("--seed", options.seed, "seed of the sensors' noise").shows_default().value("N");
   parser.option("--tick-hz", options.tick_hz, "ticks of the drive per second, a multiple of 1000")
       .shows_default()

@@ -117,9 +117,8 @@ void declare(Parser& parser, IdentifyOptions& options) {
       .value("");
   parser
       .option("--intervals", options.intervals,
-              "standard: from standard errors, wider where twice the cut-off changes a value; profile: where the best "
-              "fit of all others gets significantly worse; bootstrap: from samples "
-              "drawn again (ls and nls)")
+              "standard: from standard errors, wider where twice the cut-off changes a value; profile: profile "
+              "likelihood; bootstrap: moving-block bootstrap (ls and nls)")
       .one_of({"standard", "profile", "bootstrap"})
       .shows_default()
       .value("");

@@ -145,7 +145,7 @@ class CommandLine {
         0));
     app_.formatter(std::make_shared<HelpFormat>());
     app_.require_subcommand(1);
-    app_.set_version_flag("--version", text::tool_name(), "which build this is");
+    app_.set_version_flag("--version", text::tool_name(), "print version and build");
     for (const Command& command : commands) {
       CLI::App* sub = subcommand_of(app_, command.help);
       Parser parser(*sub);

@@ -288,10 +288,10 @@ Command monitor_command() {
       {"monitor",
        "live signals of a drive",
        "Shows mode, faults and signals as they are; on a terminal with a curve of the last seconds behind each, else "
-       "a line at a time. --json writes the samples at the end. It only reads: nothing is armed. --residual-map "
+       "a line at a time. --json writes the samples at the end. The drive is never armed. --residual-map "
        "shows where over velocity and motor angle the model on the drive fails, and how significant that is: the "
-       "drive fills the map while feedforward of its model is on (record --compensate); the first call starts the "
-       "count.",
+       "drive fills the map while feedforward of its model is on (record --compensate); the first call starts its "
+       "recording, and else nothing on the drive is changed.",
        {"flexspline monitor --drive twin --seconds 0.5", "flexspline monitor --drive twin --residual-map"}},
       declare, run);
 }

@@ -57,12 +57,12 @@ void show(const ResidualMap& map, Console& console) {
   }
 }
 std::string text_of(const MapFinding& f) {
-  const std::string certainty = f.p_value < 1e-12 ? "below 1e-12" : fmt::format("{:.1g}", f.p_value);
+  const std::string p_value = f.p_value < 1e-12 ? "p below 1e-12" : fmt::format("p = {:.1g}", f.p_value);
   const std::string what =
       f.order == 0 ? fmt::format("a torque of {} N*m at {} rad/s", output::number(f.size_nm, 3), text_of(f.velocity))
                    : fmt::format("a torque of order {} of the motor's turn, amplitude {} N*m", f.order,
                                  output::number(f.size_nm, 3));
-  return fmt::format("{} +- {}; chance that it is noise: {}", what, output::number(f.std_nm, 2), certainty);
+  return fmt::format("{} +- {}; {}, corrected for the number of tests", what, output::number(f.std_nm, 2), p_value);
 }
 void print(const drive::MapTest& j, double limit_nm, Console& console) {
   switch (j.verdict) {
@@ -96,7 +96,9 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
   const double limit_nm = options.limit_nm.value_or(drive::usual_map_limit_nm(scales));
   const drive::MapTest test = drive::test_map(map, limit_nm);
   if (started)
-    console.line("The residual map did not count (it was never read, or the block is new): it does from now.");
+    console.line(
+        "The residual map was not recorded before (first reading, or a new block). Recording starts now; read it again "
+        "after some motion.");
   show(map, console);
   print(test, limit_nm, console);
   if (options.reset) {

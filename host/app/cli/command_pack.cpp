@@ -235,7 +235,7 @@ int run(const UnpackOptions& options, Console& console) {
   table("Limits", limits_of(block));
   console.line();
   if (block.settings.empty()) {
-    console.line(fmt::format("No drive takes it: {}; good to simulate with", block.refusal));
+    console.line(fmt::format("A drive refuses this block: {}. It can be used for simulation only.", block.refusal));
   } else {
     console.line(console.bold("Settings of the drive"));
     for (const auto& q : block.settings)
@@ -304,14 +304,15 @@ Command pack_command() {
        "Turns a model into the bytes that a drive computes with: bases from the ratings in [drive], coefficients as "
        "integers, and a checksum. Proves that no number can leave its range whatever the drive measures within twice "
        "its ratings, bounds for each effect and for the sum how far the drive can be from the equations, and compares "
-       "the block with double along a hundred thousand samples of the whole envelope. A model that does not fit, "
+       "the block with the model in double precision along a hundred thousand samples of the whole envelope. A model "
+       "that does not fit, "
        "whose error along the samples is above --bound, or whose error has no bound that can be proven (unless "
        "--measured goes without one), is refused with the reason (exit code 1 for the error, 2 for all else). The "
        "model's parameters go into the block too, for unpack. With --drive the block has "
        "all that a drive needs: loops (50 Hz velocity with integral, 10 Hz position), limits, sensors, feedforward "
        "and observers, as a TOML file states them (host/drive_link/deployment/README.md has the keys) and else as the "
        "ratings "
-       "and the model suggest. Without it a block is good to simulate with; a drive refuses it.",
+       "and the model suggest. Without it a block is for simulation only; a drive refuses it.",
        {kMakeData, kIdentify, "flexspline pack --model fitted.toml --out drive.block --encoder-counts 4096",
         "printf 'format = \"flexspline-drive/1\"\\n[output_encoder]\\ncounts = 65536\\n' | tee drive.toml",
         "flexspline pack --model fitted.toml --drive drive.toml --tick-hz 20000 --encoder-counts 4096 --out "

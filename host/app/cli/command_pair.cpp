@@ -106,7 +106,9 @@ void declare(Parser& parser, PairOptions& options) {
   parser.option("--old-key", options.old_key, "the key that the drive is paired with, to exchange it")
       .value("KEY")
       .needs(key);
-  parser.flag("--lock", options.lock, "lock at once what a host left open, which ends by itself after a minute")
+  parser
+      .flag("--lock", options.lock,
+            "lock the parameters now; a drive that a host left unlocked locks itself after a minute")
       .excludes(key);
 }
 

@@ -82,18 +82,18 @@ int run(const PlanOptions& options, Console& console) {
   const model::ModelFile file = load_searched_model(options.model);
   std::optional<data::Dataset> dataset;
   if (!options.data.data.empty()) dataset = load(options.data, console);
-  planning::PlanRequest question;
-  question.model = &file.model;
-  question.dataset = dataset ? &*dataset : nullptr;
-  question.pipeline = options.pipeline.options();
-  question.setting = setting_of(options, file.model, question.dataset);
-  question.sensors = planning::sensors_of(question.dataset);
-  question.sample_s = sample_time(options, dataset ? &*dataset : nullptr, question.setting.run_s, console);
-  question.most_motions = static_cast<std::size_t>(options.motions);
-  question.progress = [&](std::string_view stage) { console.progress(stage); };
+  planning::PlanRequest request;
+  request.model = &file.model;
+  request.dataset = dataset ? &*dataset : nullptr;
+  request.pipeline = options.pipeline.options();
+  request.setting = setting_of(options, file.model, request.dataset);
+  request.sensors = planning::sensors_of(request.dataset);
+  request.sample_s = sample_time(options, dataset ? &*dataset : nullptr, request.setting.run_s, console);
+  request.most_motions = static_cast<std::size_t>(options.motions);
+  request.progress = [&](std::string_view stage) { console.progress(stage); };
   const planning::Design design = options.separate.empty()
-                                      ? planning::excite(question)
-                                      : planning::separate(question, options.separate[0], options.separate[1]);
+                                      ? planning::d_optimal(request)
+                                      : planning::discriminate(request, options.separate[0], options.separate[1]);
   for (const std::string& warning : design.warnings) console.warn(warning);
   model::save(options.out, planning::text_of(design.plan));
   output::print_plan(console, design, options.out.string());
@@ -106,7 +106,9 @@ void declare(Parser& parser, PlanOptions& options) {
   take_tolerate(parser, options.data.tolerate);
   take_model(parser, options.model);
   parser.option("--out", options.out, "the plan").required().value("PLAN");
-  parser.option("--separate", options.separate, "two effects to distinguish (default: what is not well known)")
+  parser
+      .option("--separate", options.separate,
+              "two effects to distinguish (default: a plan that determines all parameters)")
       .comma_separated()
       .number_of_values(2)
       .value("A,B");

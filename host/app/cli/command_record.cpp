@@ -83,7 +83,7 @@ json json_of(const drive::Recording& r) {
 void print(const drive::Recording& r, Console& console) {
   console.line(fmt::format("  {:<28} {:>8} samples, {:.3g} s{}", r.run.name, r.time_s.size(),
                            r.time_s.empty() ? 0.0 : r.time_s.back(),
-                           r.complete ? std::string() : ", not complete: " + r.ended));
+                           r.complete ? std::string() : ", incomplete: " + r.ended));
   if (r.lost > 0)
     console.warn(
         fmt::format("{}: {} frames were lost in {} gaps, {} of them on the drive; the file names them. Record "

@@ -94,7 +94,7 @@ std::string table_of(const Sensitivity& answer, std::vector<std::string>& nothin
       const SignalError* full = answer.full.find(s->signal, s->load);
       table.row({s == signals.front() ? label_of(variant) : "", signal_name(*s),
                  fmt::format("{} -> {}", error_text(*full), error_text(*s)), s->unit, amplitude_text(*s),
-                 phase_text(*s), s->most_in});
+                 phase_text(*s), s->worst_experiment});
     }
   }
   return table.text(0);

@@ -11,6 +11,7 @@
 #include "host/common/text/nearest.hpp"
 #include "host/input/data/findings.hpp"
 #include "host/physics/model/text.hpp"
+#include "shared/model/encoding.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -18,7 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Behind the first line's text, so that all lines stay where they are.
-constexpr std::string_view kMark = "  # an unfinished draft of flexspline new";
+std::string mark_of(std::string_view other_lines) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(other_lines.data());
+  return fmt::format("  # an unfinished draft of flexspline new, CRC-32 of the other lines {:08x}",
+                     model::crc32({bytes, other_lines.size()}));
+}
 
 std::vector<data::Finding> errors_of(const std::exception& why) {
   std::vector<data::Finding> errors;
@@ -110,7 +115,9 @@ std::string missing_counts(const std::vector<data::Finding>& errors) {
 bool is_unfinished(const fs::path& dataset_toml) {
   std::ifstream file(dataset_toml, std::ios::binary);
   std::string first;
-  return std::getline(file, first) && first.ends_with(kMark);
+  if (!std::getline(file, first)) return false;
+  const std::string others{std::istreambuf_iterator<char>(file), {}};
+  return first.ends_with(mark_of(others));
 }
 
 void leave_unfinished(const project::Draft& draft, const project::Request& request, const std::exception& why,
@@ -118,7 +125,8 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   const fs::path file = request.out / "dataset.toml";
   make_folder(request.out);
   std::string text = project::text_of(draft, request.out);
-  text.insert(text.find('\n'), kMark);
+  const std::size_t end_of_first = text.find('\n');
+  text.insert(end_of_first, mark_of(std::string_view(text).substr(end_of_first + 1)));
   model::save(file, text);
   const std::vector<data::Finding> errors = errors_of(why);
   for (const data::Finding& error : errors) console.error(error.text());

@@ -10,7 +10,7 @@
 
 namespace flexspline::cli {
 
-// Whether a dataset.toml is such a draft, which may be written over.
+// Whether a dataset.toml is such a draft that nobody has changed since, which may be written over.
 bool is_unfinished(const std::filesystem::path& dataset_toml);
 
 // Writes the draft as OUT/dataset.toml, in which the lines of `why`'s findings are right, and reports what is missing.

@@ -1,4 +1,4 @@
-// The note that the host leaves in a block: what the coefficients were derived from. A drive passes it over.
+// The note that the host leaves in a block: what the coefficients were derived from. A drive ignores it.
 #pragma once
 
 #include <cstdint>

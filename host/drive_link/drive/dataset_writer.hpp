@@ -1,4 +1,4 @@
-// Recordings as a data set that every command of the tool reads (CONTRACT: measurements).
+// Recordings as a data set that every command of the tool reads (host/input/data/RECORDINGS.md).
 #pragma once
 
 #include <filesystem>

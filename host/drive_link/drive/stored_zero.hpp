@@ -17,8 +17,8 @@ Bytes with_stored_zero(const Bytes& block, const control::StoredZero& zero);
 Bytes keeping_stored_zero(const Bytes& block, const Bytes& active);
 
 // Stores what the drive's encoders show at the zeros that `home` has just set at this position, and sets them again
-// where the encoders alone do not say them, as the drive looks for its angles anew then. Throws DriveError where no
-// encoder has a reading that would hold after the next power-on.
+// where the encoders alone do not give them, because storing restarts the search for the angles. Throws DriveError
+// where no encoder has a reading that would hold after the next power-on.
 void store_zero(Session& session, std::int64_t position);
 
 }  // namespace flexspline::drive

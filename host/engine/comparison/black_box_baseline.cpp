@@ -247,7 +247,7 @@ std::vector<BaselineResult> fit_baselines(const std::vector<BaselineSignal>& sig
             specification.orders ? *specification.orders : blackbox::choose_orders(records, specification.family);
         results.push_back(result_of(signal, specification, blackbox::fit(records, orders), all));
       } catch (const std::invalid_argument& impossible) {
-        warnings.push_back(fmt::format("--beside {}: none for {}{}{}: {}", specification.text, signal.signal,
+        warnings.push_back(fmt::format("--baseline {}: none for {}{}{}: {}", specification.text, signal.signal,
                                        signal.load.empty() ? "" : " ", signal.load, impossible.what()));
       }
     }

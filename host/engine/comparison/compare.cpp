@@ -68,7 +68,7 @@ class Comparer {
     result_.pipeline = prepared_.pipeline;
   }
 
-  Comparison all(const Extent& extent) {
+  Comparison all(const CompareOptions& extent) {
     for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
       if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
       if (estimation::terms_on(terms_, balance, prepared_.output_signals).empty()) continue;
@@ -308,7 +308,7 @@ const SignalResult* Comparison::find_overall(std::string_view signal) const {
 }
 
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& baselines, Extent extent) {
+                   const std::vector<blackbox::Specification>& baselines, CompareOptions extent) {
   return Comparer(dataset, model, options, baselines).all(extent);
 }
 

@@ -69,7 +69,7 @@ struct Comparison {
 };
 
 // Options of a comparison: parts that take longer than errors by experiment, and are not always needed.
-struct Extent {
+struct CompareOptions {
   bool free_runs = true;          // else the balances alone
   bool regions_and_gains = true;  // else neither `regions` nor H-infinity norms of balances
 };
@@ -80,7 +80,7 @@ struct Extent {
 // `baselines`: black boxes that are fitted to the same signals, see black_box_baseline.hpp. Throws model::ModelError
 // naming parameters without a value, data::DataError where no balance can be formed.
 Comparison compare(const data::Dataset& dataset, const model::Model& model, const estimation::PipelineOptions& options,
-                   const std::vector<blackbox::Specification>& baselines = {}, Extent extent = {});
+                   const std::vector<blackbox::Specification>& baselines = {}, CompareOptions extent = {});
 
 // Throws model::ModelError naming the parameters without a value, if there are any.
 void require_values(const model::Model& model);

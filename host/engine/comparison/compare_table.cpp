@@ -59,14 +59,14 @@ std::string words(const Region& r, const SignalResult& overall) {
 // One line for each black box, with the physical model's error on the same samples.
 std::string baseline_table(const std::vector<BaselineResult>& results) {
   std::string text =
-      "\nBeside the model, black boxes fitted to the same signals (free run; the model on the same samples):\n";
+      "\nBaseline comparison: black boxes fitted to the same signals (free run; the model on the same samples):\n";
   const auto line = [&text](std::string_view box, std::string_view signal, std::string_view unit,
                             const auto&... cells) {
     fmt::format_to(std::back_inserter(text), "{:<14} {:<21} {:<6}", box, signal, unit);
     ((fmt::format_to(std::back_inserter(text), " {:>10}", cells)), ...);
     text += '\n';
   };
-  line("black box", "signal", "unit", "parameters", "rmse", "model", "held out", "model", "one step", "of std");
+  line("black box", "signal", "unit", "parameters", "rmse", "model", "held out", "model", "one step", "rmse/std");
   bool unstable = false;
   for (const BaselineResult& b : results) {
     line(b.black_box + (b.stable ? "" : "!"), b.load.empty() ? b.signal : fmt::format("{} {}", b.signal, b.load),
@@ -84,7 +84,7 @@ std::string table(const Comparison& comparison) {
   std::size_t width = std::string_view("all together").size();
   for (const ExperimentResult& e : comparison.experiments) width = std::max(width, label(e).size());
   std::string text = fmt::format("{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", width,
-                                 "signal", "rmse", "unit", "of std", "noise", "excess", "largest", "gain");
+                                 "signal", "rmse", "unit", "rmse/std", "noise", "ratio", "max |e|", "H-inf");
   std::vector<const ExperimentResult*> order;
   for (const ExperimentResult& e : comparison.experiments) order.push_back(&e);
   std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return badness(*a) > badness(*b); });

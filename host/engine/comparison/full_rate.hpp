@@ -1,4 +1,5 @@
-// Residual and target of one record at every sample, where samples are too few or not evenly spaced.
+// Residual and target of one record at every sample, for what decimated and masked samples cannot serve: spectra and
+// periods.
 #pragma once
 
 #include <cstdint>

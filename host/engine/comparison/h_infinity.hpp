@@ -1,5 +1,5 @@
-// The report's second measure of a model (section 4.2.2): the H-infinity norm of the error, which is the norm that the
-// 2-norm of signals induces on what makes the error from the measured signal.
+// The report's second measure of a model (section 4.2.2): the H-infinity norm of the transfer from the measured signal
+// to the error: the largest gain over frequency, induced by the 2-norm of signals.
 #pragma once
 
 #include <cstddef>

@@ -271,7 +271,7 @@ std::vector<NoiseFloor> noise_floors(const RegressionProblem& data, const Terms&
 NoiseFloor pooled(const std::vector<NoiseFloor>& floors, const std::vector<estimation::RowRange>& records) {
   if (floors.size() != records.size()) throw std::invalid_argument("one noise floor a record is needed");
   // Worst source first: the pooled floor is named after its worst part.
-  constexpr std::array<const char*, 4> kSources{"stated", "propagated", "replicates", "periods"};
+  constexpr std::array<const char*, 3> kSources{"propagated", "replicates", "periods"};
   double sum = 0.0, rows = 0.0;
   std::size_t worst = kSources.size();
   for (std::size_t k = 0; k < floors.size(); ++k) {

@@ -11,7 +11,7 @@ namespace flexspline::comparison {
 
 struct NoiseFloor {
   std::optional<double> rmse;  // N m (N on a linear axis), over the samples of the record
-  std::string from = "none";   // periods, replicates, propagated, stated, none
+  std::string from = "none";   // periods, replicates, propagated, none
 };
 
 // Floor of the residual of each range of `data.records()`, for a model with the values in `terms`. Sources, best first:

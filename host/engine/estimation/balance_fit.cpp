@@ -55,15 +55,15 @@ class Fitting {
     }
   }
 
-  // Linear parameters at given nonlinear parameters; `whitening` is the noise covariance. Returns the weights of
+  // Linear parameters at given nonlinear parameters; `error_covariance` is the noise covariance. Returns the weights of
   // records that follow from the residual.
-  Eigen::VectorXd solve(const NoiseCovariance& whitening) {
+  Eigen::VectorXd solve(const NoiseCovariance& error_covariance) {
     form_regression();
-    const LinearFit linear = least_squares(regression_.X, regression_.y, whitening);
+    const LinearFit linear = generalised_least_squares(regression_.X, regression_.y, error_covariance);
     for (std::size_t j = 0; j < fit_.linear.size(); ++j)
       terms_[fit_.linear[j].term].values[fit_.linear[j].parameter] = linear.theta[static_cast<Eigen::Index>(j)];
     fit_.residual = linear.residual;
-    return record_weights(data_.records(), fit_.residual);
+    return root_record_weights(data_.records(), fit_.residual);
   }
 
   // How friction differs between records at the present values, for which the regression is formed.
@@ -102,7 +102,7 @@ void Fitting::fit_weighted() {
     if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.root_weights);
   }
   solve(fit_.root_weights);
-  fit_.whitening = noise_weights_ = fit_.root_weights;
+  fit_.error_covariance = noise_weights_ = fit_.root_weights;
 }
 
 void Fitting::fit_generalised() {
@@ -113,23 +113,24 @@ void Fitting::fit_generalised() {
   Eigen::VectorXd generalised_weights;
   constexpr int kGeneralised = 3;
   for (int round = 0; round < kGeneralised && between_.std.size() > 0 && between_.std.maxCoeff() > 0.0; ++round) {
-    noise_weights_ = record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
-    fit_.whitening = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_, between_.std,
-                                      between_.autocorrelation_time);
+    noise_weights_ = root_record_weights(data_.records(), between_.left.cwiseQuotient(noise_weights_));
+    fit_.error_covariance = noise_covariance(data_, noise_weights_, noise_weights_.asDiagonal() * friction_,
+                                             between_.std, between_.autocorrelation_time);
     // With random effects the best nonlinear parameter of a small effect may be far from that without.
-    if (searches && round == 0) sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening, SweepFrom::values);
-    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.whitening);
-    generalised_weights = solve(fit_.whitening);
+    if (searches && round == 0)
+      sweep_nonlinear(data_, terms_, fit_.on_balance, fit_.error_covariance, SweepFrom::values);
+    if (searches) refine_nonlinear(data_, terms_, fit_.on_balance, fit_.error_covariance);
+    generalised_weights = solve(fit_.error_covariance);
     estimate_differences();
   }
-  if (fit_.whitening.is_diagonal()) return;
+  if (fit_.error_covariance.is_diagonal()) return;
   if (between_.leaves_noise) {
     fit_.root_weights = generalised_weights;
     return;
   }
   terms_ = weighted_terms;
   fit_.residual = weighted_residual;
-  fit_.whitening = noise_weights_ = fit_.root_weights;
+  fit_.error_covariance = noise_weights_ = fit_.root_weights;
   form_regression();
   estimate_differences();
 }
@@ -138,14 +139,15 @@ void Fitting::take_uncertainty() {
   const Eigen::VectorXd weighted = fit_.root_weights.cwiseProduct(fit_.residual);
   fit_.autocorrelation_time = autocorrelation_time(data_, weighted);
   const LinearFit joint = least_squares(J_, fit_.residual, fit_.root_weights);
-  const LinearFit generalised = fit_.whitening.is_diagonal() ? joint : least_squares(J_, fit_.residual, fit_.whitening);
+  const LinearFit generalised =
+      fit_.error_covariance.is_diagonal() ? joint : generalised_least_squares(J_, fit_.residual, fit_.error_covariance);
   const double freedom = std::max(1.0, static_cast<double>(data_.rows() - J_.cols()));
   fit_.covariance = generalised.unit_covariance;
   std::vector<Eigen::Index> identified;
   for (Eigen::Index j = 0; j < J_.cols(); ++j)
     if (std::isfinite(generalised.unit_covariance(j, j))) identified.push_back(j);
   // Covariance without the records' random effects, which are added below.
-  const Eigen::MatrixXd columns = fit_.whitening.score_columns(J_(Eigen::all, identified));
+  const Eigen::MatrixXd columns = fit_.error_covariance.score_columns(J_(Eigen::all, identified));
   const Eigen::MatrixXd middle = newey_west(data_.records(), columns, between_.left,
                                             newey_west_lags(between_.autocorrelation_time, data_.rows())) *
                                  (static_cast<double>(data_.rows()) / freedom);
@@ -155,7 +157,7 @@ void Fitting::take_uncertainty() {
   fit_.root_tolerance = joint.root_tolerance;
   fit_.excitation = joint.root_tolerance_of_all;
   fit_.white_variance =
-      generalised.unit_covariance.diagonal() * ((fit_.whitening * fit_.residual).squaredNorm() / freedom);
+      generalised.unit_covariance.diagonal() * (fit_.error_covariance.whiten(fit_.residual).squaredNorm() / freedom);
   fit_.condition_number = joint.condition_number;
 }
 
@@ -168,7 +170,7 @@ BalanceFit fit_balance(const RegressionProblem& data, Terms& terms) {
   fit.linear = free_linear_parameters(terms, fit.on_balance);
   fit.nonlinear = free_nonlinear_parameters(terms, fit.on_balance);
   fit.root_weights = Eigen::VectorXd::Ones(data.rows());
-  fit.whitening = fit.root_weights;
+  fit.error_covariance = fit.root_weights;
   if (data.empty()) return fit;
   set_grid_values(data, terms, fit.on_balance);
   Fitting fitting(data, terms, fit);

@@ -20,7 +20,7 @@ struct BalanceFit {
   Eigen::VectorXd residual;      // target minus model, N m
   Eigen::VectorXd root_weights;  // one over the residual's RMS of each record
   // What the parameters were found with: weights, and friction that differs from record to record taken down.
-  NoiseCovariance whitening = Eigen::VectorXd();
+  NoiseCovariance error_covariance = Eigen::VectorXd();
   Eigen::MatrixXd covariance;      // of linear, then nonlinear parameters; corrected for autocorrelation
   Eigen::VectorXd root_tolerance;  // likewise; see LinearFit
   Eigen::VectorXd excitation;      // likewise: LinearFit::root_tolerance_of_all

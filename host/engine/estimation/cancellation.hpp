@@ -12,8 +12,8 @@ namespace detail {
 inline thread_local const CancellationCheck* check_of_thread = nullptr;
 }
 
-// For as long as it lives, work of this thread (and what it does in_parallel) calls `check` again and again; what that
-// throws ends the work. `check` is called from several threads. Null changes nothing.
+// For as long as it lives, work of this thread (and what it does in_parallel) calls `check` regularly; an exception
+// from it cancels the work. `check` is called from several threads. Null changes nothing.
 class CancellationScope {
  public:
   explicit CancellationScope(const CancellationCheck* check) : before_(detail::check_of_thread) {

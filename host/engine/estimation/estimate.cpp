@@ -106,7 +106,7 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
   if (method == Method::partitioned) {
     result = partitioned(dataset, model, pipeline);
   } else {
-    result = form(dataset, model, pipeline);
+    result = build_balances(dataset, model, pipeline);
     fit(*result);
     if (method != Method::ls && options.starts > 1) {
       options.progress("searching from several starts");
@@ -120,7 +120,7 @@ std::unique_ptr<Identification> estimate(const data::Dataset& dataset, const mod
       options.progress("fitting the free run");
       refit_to_output(*result, options.progress);
     }
-    assemble(*result);
+    compute_estimates(*result);
   }
   result->method = name_of(method);
   warn_of_scale(*result);

@@ -21,7 +21,7 @@ std::vector<AloneFit> fit_alone(const RegressionProblem& data, const BalanceFit&
     AloneFit& fit = all.emplace_back();
     fit.name = data.prepared().records[range.record].name;
     if (range.size() < 4 * X.cols()) {
-      fit.too_short = fmt::format("{} rows for {} parameters", range.size(), X.cols());
+      fit.too_short = fmt::format("{} samples for {} parameters", range.size(), X.cols());
       continue;
     }
     LinearFit alone = least_squares(X.middleRows(range.first, range.size()), y.segment(range.first, range.size()),
@@ -36,7 +36,7 @@ std::vector<AloneFit> fit_alone(const RegressionProblem& data, const BalanceFit&
   for (const auto& [record, reason] : data.evaluator().left_out()) {
     AloneFit& fit = all.emplace_back();
     fit.name = data.prepared().records[record].name;
-    fit.too_short = "too few rows are left of it";
+    fit.too_short = "too few samples are left after filtering and masking";
   }
   return all;
 }
@@ -324,7 +324,7 @@ void store_tables(Identification& result) {
 
 }  // namespace
 
-void assemble(Identification& result) {
+void compute_estimates(Identification& result) {
   const data::Axis axis = result.model.drive.axis;
   std::vector<std::uint8_t> touched(result.terms.size(), 0);
   std::vector<AloneFits> alone;
@@ -332,11 +332,11 @@ void assemble(Identification& result) {
     const RegressionProblem& data = result.data[b];
     const BalanceFit& fit = result.fits[b];
     const std::size_t first = result.estimates.size();
-    add_estimates(data, fit, result.held[b], result);
+    add_estimates(data, fit, result.at_bound[b], result);
     alone.push_back({fit_alone(data, fit, result.terms), fit.linear});
     for (std::size_t j = first; j < result.estimates.size(); ++j)
       add_by_experiment(data, alone.back(), result, result.estimates[j]);
-    for (const ParameterRef& ref : result.held[b]) result.estimates.push_back(estimate_of(result.terms, ref, axis));
+    for (const ParameterRef& ref : result.at_bound[b]) result.estimates.push_back(estimate_of(result.terms, ref, axis));
     for (const std::size_t t : fit.on_balance) touched[t] = 1;
     result.condition_number = std::max(result.condition_number, fit.condition_number);
     warn_of_excitation(data, fit, result.terms, result);

@@ -31,16 +31,17 @@ Eigen::MatrixXd cross_balance_columns(const RegressionProblem& data, const Terms
   return columns;
 }
 
-Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
-                     const NoiseCovariance& whitening, double autocorrelation_time) {
-  Eigen::MatrixXd left = whitening * cross_columns;
-  Eigen::MatrixXd scaled = whitening * own;
+ScoreAndInformation score_and_information(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own,
+                                          const Eigen::VectorXd& residual, const NoiseCovariance& error_covariance,
+                                          double autocorrelation_time) {
+  Eigen::MatrixXd left = error_covariance.whiten(cross_columns);
+  Eigen::MatrixXd scaled = error_covariance.whiten(own);
   for (auto column : scaled.colwise()) column /= std::max(column.norm(), 1e-300);
   if (scaled.cols() > 0) {
     const Eigen::MatrixXd span = algebra::PivotedQr(scaled, 1e-7).span();
     left -= span * (span.transpose() * left);
   }
-  return {left.transpose() * (whitening * residual).col(0) / autocorrelation_time,
+  return {left.transpose() * error_covariance.whiten(residual).col(0) / autocorrelation_time,
           left.transpose() * left / autocorrelation_time};
 }
 
@@ -50,7 +51,7 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
   all << own, cross_columns;
   Eigen::VectorXd weights = fit.root_weights;
   LinearFit moved = least_squares(all, residual, weights);
-  weights = record_weights(data.records(), moved.residual);
+  weights = root_record_weights(data.records(), moved.residual);
   moved = least_squares(all, residual, weights);
   const NoiseModel alike{weights, autocorrelation_time(data, weights.cwiseProduct(moved.residual))};
   const auto friction = [&] {
@@ -64,18 +65,18 @@ NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::Matrix
   };
   Eigen::MatrixXd torques = friction();
   RecordVariance between = differences(torques);
-  NoiseCovariance whitening = weights;
+  NoiseCovariance error_covariance = weights;
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds && between.std.size() > 0 && between.std.maxCoeff() > 0.0; ++round) {
-    weights = record_weights(data.records(), between.left.cwiseQuotient(weights));
-    whitening =
+    weights = root_record_weights(data.records(), between.left.cwiseQuotient(weights));
+    error_covariance =
         noise_covariance(data, weights, weights.asDiagonal() * torques, between.std, between.autocorrelation_time);
-    moved = least_squares(all, residual, whitening);
+    moved = generalised_least_squares(all, residual, error_covariance);
     torques = friction();
     between = differences(torques);
   }
-  if (whitening.is_diagonal() || !between.leaves_noise) return alike;
-  return {whitening, between.autocorrelation_time};
+  if (error_covariance.is_diagonal() || !between.leaves_noise) return alike;
+  return {error_covariance, between.autocorrelation_time};
 }
 
 Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric) {
@@ -84,10 +85,10 @@ Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& symmetric) {
          scale.asDiagonal();
 }
 
-CombinedEstimate combine(const Eigen::MatrixXd& precision, const Evidence& other) {
+CombinedEstimate combine(const Eigen::MatrixXd& precision, const ScoreAndInformation& other) {
   CombinedEstimate result;
   result.covariance = scaled_inverse(precision + other.information);
-  result.change = result.covariance * other.slope;
+  result.change = result.covariance * other.score;
   result.cost = result.change.dot(precision * result.change);
   return result;
 }

@@ -10,10 +10,10 @@
 
 namespace flexspline::estimation {
 
-// Evidence of a balance for parameters that are identified on another one, about their present values: slope and
-// (minus) curvature of its log likelihood, the balance's own parameters free.
-struct Evidence {
-  Eigen::VectorXd slope;
+// ScoreAndInformation of a balance for parameters that are identified on another one, at their present values: the
+// score vector (gradient of its log likelihood) and the observed information, the balance's own parameters free.
+struct ScoreAndInformation {
+  Eigen::VectorXd score;
   Eigen::MatrixXd information;
 };
 
@@ -23,15 +23,16 @@ Eigen::MatrixXd cross_balance_columns(const RegressionProblem& data, const Terms
                                       const std::vector<std::size_t>& parameters);
 
 // `cross_columns`: slopes of the requested parameters; `own`: of the balance's own parameters; `residual` at the
-// present values. `whitening` makes the samples' errors noise of one, of which `autocorrelation_time` samples count as
-// one.
-Evidence evidence_of(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const Eigen::VectorXd& residual,
-                     const NoiseCovariance& whitening, double autocorrelation_time);
+// present values. `error_covariance` makes the samples' errors noise of one, of which `autocorrelation_time` samples
+// count as one.
+ScoreAndInformation score_and_information(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own,
+                                          const Eigen::VectorXd& residual, const NoiseCovariance& error_covariance,
+                                          double autocorrelation_time);
 
 // The noise of a balance where those of `cross_columns` are not at their final values: those and the balance's own are
 // fitted to first order for the moment, so that their errors are not taken for friction that differs.
 struct NoiseModel {
-  NoiseCovariance whitening;
+  NoiseCovariance error_covariance;
   double autocorrelation_time;
 };
 NoiseModel noise_model(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own, const RegressionProblem& data,
@@ -47,6 +48,6 @@ struct CombinedEstimate {
   double cost = 0.0;
   Eigen::MatrixXd covariance;
 };
-CombinedEstimate combine(const Eigen::MatrixXd& precision, const Evidence& other);
+CombinedEstimate combine(const Eigen::MatrixXd& precision, const ScoreAndInformation& other);
 
 }  // namespace flexspline::estimation

@@ -35,9 +35,9 @@ inline constexpr std::size_t kFewestRecords = 3;
 std::vector<FrictionGroup> friction_groups(const Terms& terms, const std::vector<ParameterRef>& linear,
                                            const std::vector<ParameterRef>& nonlinear = {});
 
-// What a factor of each group does to the torque is X times these, `theta` being the values of the columns of X times
-// `size`, which X was divided by. Columns of free nonlinear parameters, where there are any, begin at
-// `first_nonlinear`.
+// One column u a group: a relative change b of the friction of that group changes the torque by X u b. `theta` are the
+// values of the columns of X, each of which was divided by `size`. Columns of free nonlinear parameters, where there
+// are any, begin at `first_nonlinear`.
 Eigen::MatrixXd random_effect_directions(const std::vector<FrictionGroup>& groups, const Eigen::VectorXd& theta,
                                          const Eigen::VectorXd& size, Eigen::Index first_nonlinear);
 

@@ -8,8 +8,8 @@
 #include <map>
 #include <tuple>
 
+#include "host/engine/estimation/build_balances.hpp"
 #include "host/engine/estimation/evidence.hpp"
-#include "host/engine/estimation/form_on.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/estimation/record_constants.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
@@ -85,8 +85,8 @@ bool combine_balances(Identification& result, std::size_t identified, std::size_
   const Eigen::MatrixXd own = data.slopes(result.terms, its.on_balance, its.linear, its.nonlinear);
   const Eigen::VectorXd residual = data.residual(result.terms);
   const NoiseModel noise = noise_model(cross_columns, own, data, result.terms, its, residual);
-  const Evidence evidence =
-      evidence_of(cross_columns, own, residual, noise.whitening, std::max(1.0, noise.autocorrelation_time));
+  const ScoreAndInformation evidence = score_and_information(cross_columns, own, residual, noise.error_covariance,
+                                                             std::max(1.0, noise.autocorrelation_time));
   const Eigen::MatrixXd before = fit.covariance(shared.at, shared.at);
   const Eigen::MatrixXd precision = scaled_inverse(before);
   const CombinedEstimate both = combine(precision, evidence);
@@ -179,19 +179,21 @@ std::vector<const data::Experiment*> experiments_to_fit(const data::Dataset& dat
   for (const data::Experiment& e : dataset.experiments)
     if (e.role == data::Role::fit) fit_on.push_back(&e);
   if (fit_on.empty())
-    throw data::DataError({{data::Severity::error, "too_few_samples", "", 0, "", "no experiment has the role fit",
-                            "give at least one experiment to fit on, or drop --holdout"}});
+    throw data::DataError(
+        {{data::Severity::error, "too_few_samples", "", 0, "", "no experiment has the role fit; all are held out",
+          "give at least one experiment to fit on; the role stands in the file (\"role\" in the header "
+          "of a CSV or in dataset.toml), and --holdout sets it"}});
   return fit_on;
 }
 
-std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
-                                     const PipelineOptions& options) {
-  return form_on(experiments_to_fit(dataset), dataset, model, options);
+std::unique_ptr<Identification> build_balances(const data::Dataset& dataset, const model::Model& model,
+                                               const PipelineOptions& options) {
+  return build_balances_from(experiments_to_fit(dataset), dataset, model, options);
 }
 
-std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment*>& fit_on,
-                                        const data::Dataset& dataset, const model::Model& model,
-                                        const PipelineOptions& options) {
+std::unique_ptr<Identification> build_balances_from(const std::vector<const data::Experiment*>& fit_on,
+                                                    const data::Dataset& dataset, const model::Model& model,
+                                                    const PipelineOptions& options) {
   auto result = std::make_unique<Identification>();
   result->model = model;
   result->model.drive = reconcile(model.drive, dataset, result->warnings);
@@ -216,7 +218,7 @@ std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment
     PipelineOptions unmasked = options;
     unmasked.mask = false;
     unmasked.ready = nullptr;
-    auto kept = form_on(fit_on, dataset, model, unmasked);
+    auto kept = build_balances_from(fit_on, dataset, model, unmasked);
     kept->warnings.push_back(fmt::format(
         "reversals are not left out, as too few samples would remain in {}: static friction laws do not hold "
         "there; record longer strokes",
@@ -284,7 +286,7 @@ void fit(Identification& result) {
   const auto again = [&] {
     // Warnings of the previous fit may no longer hold.
     result.warnings = before;
-    result.held = fit_all(result, result.model.drive.axis);
+    result.at_bound = fit_all(result, result.model.drive.axis);
   };
   again();
   constexpr int kRounds = 3;
@@ -299,9 +301,9 @@ void fit(Identification& result) {
 
 std::unique_ptr<Identification> identify(const data::Dataset& dataset, const model::Model& model,
                                          const PipelineOptions& options) {
-  auto result = form(dataset, model, options);
+  auto result = build_balances(dataset, model, options);
   fit(*result);
-  assemble(*result);
+  compute_estimates(*result);
   return result;
 }
 

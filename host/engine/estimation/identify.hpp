@@ -41,10 +41,10 @@ struct Derived : ByExperiment {
 struct Identification {
   std::string_view method = "";  // as in Options of estimate.hpp; empty: of identify()
   PreparedData prepared;
-  Terms terms;                                  // with values
-  std::vector<RegressionProblem> data;          // the balances that could be formed
-  std::vector<BalanceFit> fits;                 // one each
-  std::vector<std::vector<ParameterRef>> held;  // on each, parameters that are held at a bound
+  Terms terms;                                      // with values
+  std::vector<RegressionProblem> data;              // the balances that could be formed
+  std::vector<BalanceFit> fits;                     // one each
+  std::vector<std::vector<ParameterRef>> at_bound;  // on each, parameters whose value is their bound
   std::vector<Estimate> estimates;
   std::vector<std::pair<std::string, LearnedTable>> tables;  // by id: those of the model that are not fixed
   std::vector<Derived> derived;
@@ -60,14 +60,14 @@ std::unique_ptr<Identification> identify(const data::Dataset& dataset, const mod
 
 // Its three steps, for other estimators to come between: balances from the data; their fit; estimates, tables and
 // warnings from the fits and the values in `terms`.
-std::unique_ptr<Identification> form(const data::Dataset& dataset, const model::Model& model,
-                                     const PipelineOptions& options);
+std::unique_ptr<Identification> build_balances(const data::Dataset& dataset, const model::Model& model,
+                                               const PipelineOptions& options);
 void fit(Identification& identification);
 // Fits a balance; a parameter whose best value is not possible (negative friction) is held at its bound and the others
 // are fitted again. Returns the fit and what was held at a bound, which is among the warnings.
 std::pair<BalanceFit, std::vector<ParameterRef>> fit_within_bounds(const RegressionProblem& data, Terms& terms,
                                                                    data::Axis axis, std::vector<std::string>& warnings);
-void assemble(Identification& identification);
+void compute_estimates(Identification& identification);
 
 // Where data set and model differ in what they know of the drive by more than 0.1 %: the model wins, with a warning.
 // What only the data set knows is filled in.

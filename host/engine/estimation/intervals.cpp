@@ -28,14 +28,14 @@ double natural(const Terms& terms, const ParameterRef& ref) {
 // Fits all that is free on the balance from the present values of the terms, and returns the sum of squares of white
 // errors.
 double fit_rest(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                const NoiseCovariance& whitening) {
-  refine_nonlinear(data, terms, on_balance, whitening);
+                const NoiseCovariance& error_covariance) {
+  refine_nonlinear(data, terms, on_balance, error_covariance);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   const auto [X, y] = data.regression(terms, on_balance, linear);
-  const LinearFit fit = least_squares(X, y, whitening);
+  const LinearFit fit = generalised_least_squares(X, y, error_covariance);
   for (std::size_t j = 0; j < linear.size(); ++j)
     terms[linear[j].term].values[linear[j].parameter] = fit.theta[static_cast<Eigen::Index>(j)];
-  return (whitening * fit.residual).squaredNorm();
+  return error_covariance.whiten(fit.residual).squaredNorm();
 }
 
 // The value of one parameter at which the sum of squares, with all others fitted, has grown by `allowed`; `side` -1
@@ -48,7 +48,7 @@ std::optional<double> end_of_profile(const RegressionProblem& data, const Terms&
   terms[ref.term].known[ref.parameter] = 1;
   const auto excess_at = [&](double value) {
     terms[ref.term].values[ref.parameter] = value;
-    return fit_rest(data, terms, fit.on_balance, fit.whitening) - least - allowed;
+    return fit_rest(data, terms, fit.on_balance, fit.error_covariance) - least - allowed;
   };
   // Outward in growing steps, then by halving.
   double inside = start, outside = start;
@@ -65,7 +65,7 @@ std::optional<double> end_of_profile(const RegressionProblem& data, const Terms&
     (excess_at(middle) > 0.0 ? outside : inside) = middle;
   }
   terms[ref.term].values[ref.parameter] = 0.5 * (inside + outside);
-  fit_rest(data, terms, fit.on_balance, fit.whitening);
+  fit_rest(data, terms, fit.on_balance, fit.error_covariance);
   return natural(terms, ref);
 }
 
@@ -82,7 +82,7 @@ void profile(Identification& identification, const Progress& progress) {
     const BalanceFit& fit = identification.fits[b];
     const RegressionProblem& data = identification.data[b];
     Terms best = identification.terms;
-    const double least = fit_rest(data, best, fit.on_balance, fit.whitening);
+    const double least = fit_rest(data, best, fit.on_balance, fit.error_covariance);
     const auto refs = parameter_refs(fit);
     const double freedom = std::max(1.0, static_cast<double>(data.rows()) - static_cast<double>(refs.size()));
     for (std::size_t j = 0; j < refs.size(); ++j) {
@@ -143,7 +143,7 @@ void bootstrap(Identification& identification, int replicates, std::uint64_t see
       for (std::size_t k = 0; k < blocks.size(); ++k)
         counts.segment(blocks[k].first, blocks[k].size()).setConstant(std::sqrt(static_cast<double>(times[k])));
       Terms terms = identification.terms;
-      fit_rest(data, terms, fit.on_balance, fit.whitening.with_counts(counts));
+      fit_rest(data, terms, fit.on_balance, fit.error_covariance.with_counts(counts));
       for (std::size_t j = 0; j < refs.size(); ++j) drawn[j].push_back(natural(terms, refs[j]));
     }
     for (std::size_t j = 0; j < refs.size(); ++j) {

@@ -102,7 +102,7 @@ LearnedTable learned(const RegressionProblem& data, const OtherColumns& b, Fitte
   result.decrease_percent = curve.squares_without > 0.0 ? 100.0 * fitted.decrease() / curve.squares_without : 0.0;
   result.score =
       curve.squares_with > 0.0 ? curve.rows / tau * std::log(curve.squares_without / curve.squares_with) : 0.0;
-  result.effective = curve.effective;
+  result.effective_degrees_of_freedom = curve.effective_degrees_of_freedom;
   for (const Eigen::Index column : curve.left_to) {
     const std::string& id = b.ids[static_cast<std::size_t>(column)];
     if (std::find(result.left_to.begin(), result.left_to.end(), id) == result.left_to.end())
@@ -149,7 +149,7 @@ std::optional<LearnedTable> learn_table(const RegressionProblem& data, const Ter
     const Fitted fitted = fit_points(data, terms, specification, first, b, kFewSmoothings);
     const Eigen::VectorXd keep = (root_weights.array() > 0.0).cast<double>();
     b.problem.root_weights =
-        keep.cwiseProduct(record_weights(data.records(), keep.cwiseProduct(fitted.curve.residual)));
+        keep.cwiseProduct(root_record_weights(data.records(), keep.cwiseProduct(fitted.curve.residual)));
   }
   if (!specification.at.empty()) return learned(data, b, fit_points(data, terms, specification, specification.at, b));
   std::vector<Fitted> tried;

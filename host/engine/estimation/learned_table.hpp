@@ -19,8 +19,8 @@ struct LearnedTable {
   double rmse_cv_after = 0.0;
   double decrease_percent = 0.0;
   double score = 0.0;
-  double effective = 0.0;            // numbers that the curve uses
-  std::vector<std::string> left_to;  // effects of the model that hold what the curve and they could both draw
+  double effective_degrees_of_freedom = 0.0;  // of the curve
+  std::vector<std::string> left_to;           // effects of the model that hold what the curve and they could both draw
   std::vector<std::uint8_t>
       visited;  // one a point: whether samples are there; else it is extrapolated from its neighbours
   Eigen::VectorXd residual;

@@ -81,14 +81,16 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
   }
 }
 
-LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening) {
-  if (whitening.is_diagonal()) return least_squares(X, y, whitening.root_weights());
-  LinearFit fit = least_squares(whitening * X, (whitening * y).col(0), Eigen::VectorXd::Ones(y.size()));
+LinearFit generalised_least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                    const NoiseCovariance& error_covariance) {
+  if (error_covariance.is_diagonal()) return least_squares(X, y, error_covariance.root_weights());
+  LinearFit fit =
+      least_squares(error_covariance.whiten(X), error_covariance.whiten(y).col(0), Eigen::VectorXd::Ones(y.size()));
   fit.residual = y - X * fit.theta;
   return fit;
 }
 
-Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual) {
+Eigen::VectorXd root_record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(residual.size());
   std::vector<double> noise;
   for (const RowRange& range : records)

@@ -13,7 +13,8 @@ struct LinearFit {
   Eigen::VectorXd theta;            // one a column of X
   Eigen::VectorXd residual;         // y - X theta, unweighted
   Eigen::MatrixXd unit_covariance;  // (X' W X)^-1; infinite on what is not determined
-  // Of each column, the share that is orthogonal to all other columns (sine of its angle to their span), 0 to 1. Below
+  // Of each column, the share that is orthogonal to all other columns (sine of its angle to their span), 0 to 1: the
+  // square root of the tolerance 1 - R^2, one over the variance inflation factor. Below
   // kUndetermined the parameter is left at zero and the data do not identify it.
   Eigen::VectorXd root_tolerance;
   Eigen::VectorXd root_tolerance_of_all;  // the same, counting also the columns that were taken out as not determined
@@ -25,12 +26,14 @@ inline constexpr double kUndetermined = 1e-3;
 // `root_weights`: square roots of the weights, one a sample. A column of zeros is undetermined.
 LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::VectorXd& root_weights);
 
-// The same with errors that samples of a record have in common taken down: generalised least squares.
-LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const NoiseCovariance& whitening);
+// Generalised least squares (Aitken 1935): the same with errors that samples of a record have in common.
+LinearFit generalised_least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
+                                    const NoiseCovariance& error_covariance);
 
-// One over the residual's RMS of each record, repeated along its samples: records with more noise count less. A record
-// is never weighted more than ten times the median one, so that a silent record does not rule the fit.
-Eigen::VectorXd record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
+// Square roots of weights: one over the residual's RMS of each record, repeated along its samples: records with more
+// noise count less. A record is never weighted more than ten times the median one, so that a silent record does not
+// rule the fit.
+Eigen::VectorXd root_record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
 
 // What neighbouring samples have in common, in a covariance (Newey and West 1987): the sum over lags of the products of
 // columns and residual, X'rr'X with weights that fall to zero at `lags` samples. The covariance of least squares with

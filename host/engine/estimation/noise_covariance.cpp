@@ -26,8 +26,8 @@ void NoiseCovariance::remove_common(Eigen::MatrixXd& rows) const {
   }
 }
 
-Eigen::MatrixXd NoiseCovariance::operator*(const Eigen::MatrixXd& rows) const {
-  Eigen::MatrixXd white = root_weights_.asDiagonal() * rows;
+Eigen::MatrixXd NoiseCovariance::whiten(const Eigen::MatrixXd& samples) const {
+  Eigen::MatrixXd white = root_weights_.asDiagonal() * samples;
   remove_common(white);
   if (root_counts_.size() > 0) white = root_counts_.asDiagonal() * white;
   return white;
@@ -40,7 +40,7 @@ NoiseCovariance NoiseCovariance::with_counts(const Eigen::VectorXd& root_counts)
 }
 
 Eigen::MatrixXd NoiseCovariance::score_columns(const Eigen::MatrixXd& rows) const {
-  Eigen::MatrixXd white = *this * rows;
+  Eigen::MatrixXd white = whiten(rows);
   remove_common(white);
   return white;
 }
@@ -48,12 +48,12 @@ Eigen::MatrixXd NoiseCovariance::score_columns(const Eigen::MatrixXd& rows) cons
 NoiseCovariance noise_covariance(const RegressionProblem& data, const Eigen::VectorXd& root_weights,
                                  const Eigen::MatrixXd& torques, const Eigen::VectorXd& std,
                                  double autocorrelation_time) {
-  NoiseCovariance whitening(root_weights);
-  if (std.size() == 0 || std.maxCoeff() <= 0.0) return whitening;
+  NoiseCovariance error_covariance(root_weights);
+  if (std.size() == 0 || std.maxCoeff() <= 0.0) return error_covariance;
   const Eigen::MatrixXd along = torques * std.asDiagonal() / std::sqrt(autocorrelation_time);
   for (const RowRange& range : data.records())
-    whitening.add_random_effects(range, along.middleRows(range.first, range.size()));
-  return whitening;
+    error_covariance.add_random_effects(range, along.middleRows(range.first, range.size()));
+  return error_covariance;
 }
 
 }  // namespace flexspline::estimation

@@ -24,8 +24,8 @@ class NoiseCovariance {
   bool is_diagonal() const { return common_.empty() && root_counts_.size() == 0; }
   const Eigen::VectorXd& root_weights() const { return root_weights_; }
 
-  // `rows` (one for each sample of the data), made white.
-  Eigen::MatrixXd operator*(const Eigen::MatrixXd& rows) const;
+  // Sigma^(-1/2) times `samples` (one row for each sample of the data), Sigma this covariance.
+  Eigen::MatrixXd whiten(const Eigen::MatrixXd& samples) const;
   // (I + B B')^-1 W^1/2 times `rows`: what generalised least squares multiplies weighted errors by.
   Eigen::MatrixXd score_columns(const Eigen::MatrixXd& rows) const;
 

@@ -211,7 +211,7 @@ class OutputError {
       for (const Part& part : parts_)
         if (part.signal == signal) ranges.push_back(part.range);
       if (ranges.empty()) continue;
-      const Eigen::VectorXd some = record_weights(ranges, error);
+      const Eigen::VectorXd some = root_record_weights(ranges, error);
       for (const RowRange& range : ranges)
         weights.segment(range.first, range.size()) = some.segment(range.first, range.size());
     }

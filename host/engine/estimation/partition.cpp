@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "host/engine/estimation/form_on.hpp"
+#include "host/engine/estimation/build_balances.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
 namespace flexspline::estimation {
@@ -137,14 +137,14 @@ std::unique_ptr<Identification> fast_then_slow(const FastAndSlow& records, const
                                                const PipelineOptions& pipeline) {
   PipelineOptions own = pipeline;
   own.ready = nullptr;
-  auto first = form_on(records.fast, dataset, simple, own);
+  auto first = build_balances_from(records.fast, dataset, simple, own);
   fit(*first);
-  assemble(*first);
-  auto all = form_on(records.slow, dataset, model, own);
+  compute_estimates(*first);
+  auto all = build_balances_from(records.slow, dataset, model, own);
   std::vector<std::size_t> term_now;
   const std::vector<ParameterRef> plugged_in = plug_in(*first, *all, term_now);
   fit(*all);
-  assemble(*all);
+  compute_estimates(*all);
   for (const ParameterRef& ref : plugged_in) all->terms[ref.term].known[ref.parameter] = 0;
   std::erase_if(all->estimates, [&](const Estimate& e) { return std::ranges::count(plugged_in, e.ref) > 0; });
   std::vector<Estimate> estimates = first->estimates;
@@ -169,17 +169,17 @@ std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const 
   model::Model simple = model;
   std::erase_if(simple.effects, [](const model::Effect& effect) { return has_free_nonlinear(term_of(effect)); });
   if (simple.effects.empty() || simple.effects.size() == model.effects.size()) {
-    auto all = form(dataset, model, pipeline);
+    auto all = build_balances(dataset, model, pipeline);
     fit(*all);
-    assemble(*all);
+    compute_estimates(*all);
     return all;
   }
   if (shows_at_low_speed(terms_of(model))) {
     const FastAndSlow records = by_speed(experiments_to_fit(dataset));
     if (!records.fast.empty()) return fast_then_slow(records, dataset, model, simple, pipeline);
   }
-  auto all = form(dataset, model, pipeline);
-  auto first = form(dataset, simple, pipeline);
+  auto all = build_balances(dataset, model, pipeline);
+  auto first = build_balances(dataset, simple, pipeline);
   fit(*first);
   std::vector<std::size_t> term_now;
   const std::vector<ParameterRef> plugged_in = plug_in(*first, *all, term_now);
@@ -189,7 +189,7 @@ std::unique_ptr<Identification> partitioned(const data::Dataset& dataset, const 
     for (const BalanceFit& before : first->fits)
       if (before.balance == fit.balance) put_before(fit, before, term_now);
   all->warnings.insert(all->warnings.end(), first->warnings.begin(), first->warnings.end());
-  assemble(*all);
+  compute_estimates(*all);
   return all;
 }
 
@@ -239,7 +239,7 @@ void search_from_several_starts(Identification& identification, int starts, std:
       identification.terms[ref.term].stated[ref.parameter] = 1;
     }
     std::vector<std::string> warnings;
-    std::tie(fit, identification.held[b]) =
+    std::tie(fit, identification.at_bound[b]) =
         fit_within_bounds(data, identification.terms, identification.model.drive.axis, warnings);
     for (std::string& warning : warnings)
       if (std::ranges::find(identification.warnings, warning) == identification.warnings.end())

@@ -139,7 +139,8 @@ struct PreparedData {
 bool has_presliding(const model::Model& model);
 
 // Makes all experiments ready. Equations: report 82 (motor), 78 (transmission), 45 (load). Positions, where there are
-// any, give velocity and acceleration; a tachometer is used only without them.
+// any, give velocity and acceleration; a measured velocity is combined with them where it has less noise
+// (fused_velocity.hpp).
 // Of the model the drive is used, as reconcile() leaves it (identify.hpp), and the velocity of its friction laws where
 // it is given and fixed: the cut-off leaves samples that are as slow.
 // Throws data::DataError where no balance can be formed or a record is too short for the filters.

@@ -152,15 +152,17 @@ struct Changes {
 void add_draw(const RegressionProblem& data, const BalanceFit& fit, const Linearised& own, const Eigen::VectorXd& start,
               const std::vector<const Linearised*>& noisy, Eigen::Index draw_index, Changes& changes) {
   std::vector<Eigen::VectorXd> step;
-  for (const Linearised* n : noisy) step.push_back(least_squares(n->J, n->residual, fit.whitening).theta - start);
+  for (const Linearised* n : noisy)
+    step.push_back(generalised_least_squares(n->J, n->residual, fit.error_covariance).theta - start);
   changes.at_twice.col(draw_index) = 0.5 * (step[0] + step[1]);
   changes.at_four_times.col(draw_index) = 0.5 * (step[2] + step[3]);
   changes.chance.col(draw_index) = 0.5 * (step[0] - step[1]);
   const Eigen::VectorXd moved =
       0.5 * (noisy[0]->residual - noisy[1]->residual) - own.J * changes.chance.col(draw_index);
-  changes.middle += newey_west(data.records(), fit.whitening.score_columns(own.J), fit.root_weights.cwiseProduct(moved),
-                               newey_west_lags(fit.autocorrelation_time, data.rows())) /
-                    static_cast<double>(kDraws);
+  changes.middle +=
+      newey_west(data.records(), fit.error_covariance.score_columns(own.J), fit.root_weights.cwiseProduct(moved),
+                 newey_west_lags(fit.autocorrelation_time, data.rows())) /
+      static_cast<double>(kDraws);
 }
 
 RegressorNoise summarised(const Changes& changes, const Eigen::MatrixXd& unit,
@@ -194,7 +196,7 @@ std::vector<RegressorNoise> regressor_noise(Identification& found) {
   std::vector<Changes> changes(found.fits.size());
   for (std::size_t b = 0; b < found.fits.size(); ++b) {
     own.push_back(linearised(found.data[b], found.fits[b], found.terms, identified[b]));
-    fits.push_back(least_squares(own.back().J, own.back().residual, found.fits[b].whitening));
+    fits.push_back(generalised_least_squares(own.back().J, own.back().residual, found.fits[b].error_covariance));
     const Eigen::Index n = own.back().J.cols();
     changes[b].at_twice = changes[b].at_four_times = changes[b].chance =
         Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(kDraws));
@@ -240,7 +242,7 @@ std::vector<Eigen::VectorXd> change_by_held_step(Identification& found) {
     if (identified[b].empty()) continue;
     const Linearised own = linearised(found.data[b], found.fits[b], found.terms, identified[b]);
     const auto estimate = [&](const Linearised& data) {
-      return least_squares(data.J, data.residual, found.fits[b].whitening).theta;
+      return generalised_least_squares(data.J, data.residual, found.fits[b].error_covariance).theta;
     };
     changes[b](identified[b]) = estimate(others[b]) - estimate(own);
   }

@@ -1,4 +1,4 @@
-// What noise of the signals that columns are made of does to estimates, beyond what their standard errors count.
+// Bias and additional variance of the estimates that noise of the regressors causes (errors in variables), by SIMEX.
 #pragma once
 
 #include <Eigen/Core>

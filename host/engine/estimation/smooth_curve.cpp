@@ -190,8 +190,9 @@ Curve finish(const CurveProblem& p, const Products& g, const EffectiveParameters
   curve.rows = static_cast<double>((p.root_weights.array() > 0.0).count());
   const Eigen::Index n = freedom.basis.cols(), all = g.others + n;
   const Matrix inverse = solver.factor(g.all, smoothing).solve(Matrix::Identity(all, all));
-  curve.effective = (inverse * solver.projected(g.all)).diagonal().tail(n).sum();
-  const double freedom_left = std::max(1.0, curve.rows - static_cast<double>(g.others) - curve.effective);
+  curve.effective_degrees_of_freedom = (inverse * solver.projected(g.all)).diagonal().tail(n).sum();
+  const double freedom_left =
+      std::max(1.0, curve.rows - static_cast<double>(g.others) - curve.effective_degrees_of_freedom);
   const double noise = p.root_weights.cwiseProduct(curve.residual).squaredNorm() / freedom_left;
   curve.covariance = noise * freedom.basis * inverse.bottomRightCorner(n, n) * freedom.basis.transpose();
   curve.squares_without = left_out_without(g);

@@ -23,12 +23,12 @@ struct Curve {
   Eigen::VectorXd value;       // at each point
   Eigen::MatrixXd covariance;  // of the values, for white noise; times the autocorrelation time for other noise
   Eigen::VectorXd beta;
-  Eigen::VectorXd residual;      // unweighted
-  double smoothing = 0.0;        // factor of the squared second differences
-  double effective = 0.0;        // numbers that the curve uses: the trace of its part of the hat matrix
-  double squares_without = 0.0;  // weighted, of samples left out of the fit of the others alone
-  double squares_with = 0.0;     // the same with the curve
-  double rows = 0.0;             // that count
+  Eigen::VectorXd residual;                   // unweighted
+  double smoothing = 0.0;                     // factor of the squared second differences
+  double effective_degrees_of_freedom = 0.0;  // trace of the curve's part of the hat matrix
+  double squares_without = 0.0;               // weighted, of samples left out of the fit of the others alone
+  double squares_with = 0.0;                  // the same with the curve
+  double rows = 0.0;                          // that count
   // What the other columns can draw themselves was left to them: the curve's torque has no part in it. How many
   // directions of the curve that were, and for each the other column that is most like it.
   std::vector<Eigen::Index> left_to;
@@ -37,8 +37,7 @@ struct Curve {
 // Minimises |W^(1/2) (target - others beta - points t)|^2 + smoothing |D t|^2 with D the second differences (Whittaker
 // 1923; Eilers and Marx 1996 for the view as P-splines of degree one), where t's torque is held orthogonal, in the
 // data, to what `others` represent to more than `kCollinear` of its length. The smoothing is the one whose fits predict
-// left-out folds best.
-// That one is searched for on so many values over fourteen decades.
+// left-out folds best, of so many values over fourteen decades.
 inline constexpr int kSmoothings = 29;
 Curve fit_curve(const CurveProblem& problem, int smoothings = kSmoothings);
 // The same with a given smoothing.

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/minimise.hpp"
 #include "host/engine/estimation/strokes.hpp"
@@ -15,12 +16,7 @@ namespace {
 
 using effects::Limit;
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
+using numbers::quantile;
 
 // Magnitudes of a signal over the samples of the balance.
 template <class Signal>
@@ -77,17 +73,17 @@ struct ScaledColumns {
   Eigen::MatrixXd A;
   Eigen::VectorXd size;
 };
-ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& whitening) {
-  ScaledColumns s{whitening * X, {}};
+ScaledColumns scaled_columns(const Eigen::MatrixXd& X, const NoiseCovariance& error_covariance) {
+  ScaledColumns s{error_covariance.whiten(X), {}};
   s.size = s.A.colwise().norm().transpose().array().max(1e-300);
   s.A *= s.size.cwiseInverse().asDiagonal();
   return s;
 }
 
 // The sum over samples of weighted squares after the best linear parameters.
-double projected_cost(const RegressionProblem::Regression& regression, const NoiseCovariance& whitening) {
-  const Eigen::MatrixXd A = scaled_columns(regression.X, whitening).A;
-  const Eigen::VectorXd b = whitening * regression.y;
+double projected_cost(const RegressionProblem::Regression& regression, const NoiseCovariance& error_covariance) {
+  const Eigen::MatrixXd A = scaled_columns(regression.X, error_covariance).A;
+  const Eigen::VectorXd b = error_covariance.whiten(regression.y);
   return (b - A * algebra::PivotedQr(A).solve(b)).squaredNorm();
 }
 
@@ -199,7 +195,7 @@ std::vector<double> parameter_grid(const ParameterRange& range, std::size_t coun
 }
 
 void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening, SweepFrom from) {
+                     const NoiseCovariance& error_covariance, SweepFrom from) {
   const std::vector<ParameterRef> nonlinear = free_nonlinear_parameters(terms, on_balance);
   const std::vector<ParameterRef> linear = free_linear_parameters(terms, on_balance);
   std::vector<ParameterRef> open;
@@ -214,7 +210,7 @@ void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vec
                                             : parameter_range(data, terms[s.term], s.parameter).at(0.5);
   }
   constexpr std::size_t kGrid = 6;
-  const auto cost_now = [&] { return projected_cost(data.regression(terms, on_balance, linear), whitening); };
+  const auto cost_now = [&] { return projected_cost(data.regression(terms, on_balance, linear), error_covariance); };
   for (int around = 0; around < (open.size() > 1 ? 2 : 1); ++around)
     for (const ParameterRef& s : open) {
       double& value = terms[s.term].values[s.parameter];
@@ -232,9 +228,9 @@ void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vec
 }
 
 double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening) {
+                        const NoiseCovariance& error_covariance) {
   constexpr double kTolerance = 1e-9;
-  return refine_nonlinear(data, terms, on_balance, whitening, kTolerance);
+  return refine_nonlinear(data, terms, on_balance, error_covariance, kTolerance);
 }
 
 namespace {
@@ -243,10 +239,10 @@ namespace {
 class ProjectedResidual {
  public:
   ProjectedResidual(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                    const NoiseCovariance& whitening)
+                    const NoiseCovariance& error_covariance)
       : terms_(terms),
         on_balance_(on_balance),
-        whitening_(whitening),
+        error_covariance_(error_covariance),
         nonlinear_(free_nonlinear_parameters(terms, on_balance)),
         linear_(free_linear_parameters(terms, on_balance)) {
     for (const ParameterRef& s : nonlinear_) ranges_.push_back(parameter_range(data, terms[s.term], s.parameter));
@@ -283,10 +279,10 @@ class ProjectedResidual {
  private:
   void factor(const std::vector<double>& shares) {
     const RegressionProblem::Regression regression = on_->regression(terms_, on_balance_, linear_);
-    ScaledColumns columns = scaled_columns(regression.X, whitening_);
+    ScaledColumns columns = scaled_columns(regression.X, error_covariance_);
     A_ = std::move(columns.A);
     size_ = std::move(columns.size);
-    const Eigen::VectorXd b = whitening_ * regression.y;
+    const Eigen::VectorXd b = error_covariance_.whiten(regression.y);
     qr_ = algebra::PivotedQr(A_);
     theta_ = qr_.solve(b);
     left_ = b - A_ * theta_;
@@ -299,7 +295,7 @@ class ProjectedResidual {
           theta_[static_cast<Eigen::Index>(j)] / size_[static_cast<Eigen::Index>(j)];
     slopes.resize(left_.size(), static_cast<Eigen::Index>(nonlinear_.size()));
     constexpr double kDifference = 1e-6;
-    const Eigen::MatrixXd columns = whitening_ * on_->nonlinear_columns(terms_, on_balance_, nonlinear_);
+    const Eigen::MatrixXd columns = error_covariance_.whiten(on_->nonlinear_columns(terms_, on_balance_, nonlinear_));
     for (std::size_t j = 0; j < nonlinear_.size(); ++j) {
       const double per_share =
           (ranges_[j].at(shares[j] + kDifference) - ranges_[j].at(shares[j] - kDifference)) / (2.0 * kDifference);
@@ -310,7 +306,7 @@ class ProjectedResidual {
 
   Terms& terms_;
   const std::vector<std::size_t>& on_balance_;
-  const NoiseCovariance& whitening_;
+  const NoiseCovariance& error_covariance_;
   std::vector<ParameterRef> nonlinear_, linear_;
   std::vector<ParameterRange> ranges_;
   const RegressionProblem* on_ = nullptr;
@@ -323,10 +319,11 @@ class ProjectedResidual {
 }  // namespace
 
 double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening, double tolerance, const RegressionProblem* coarse) {
-  ProjectedResidual projected(data, terms, on_balance, whitening);
+                        const NoiseCovariance& error_covariance, double tolerance, const RegressionProblem* coarse) {
+  ProjectedResidual projected(data, terms, on_balance, error_covariance);
   if (projected.nonlinear() == 0 || data.empty())
-    return projected_cost(data.regression(terms, on_balance, free_linear_parameters(terms, on_balance)), whitening);
+    return projected_cost(data.regression(terms, on_balance, free_linear_parameters(terms, on_balance)),
+                          error_covariance);
   Minimisation how;
   how.low.assign(projected.nonlinear(), 0.0);
   how.high.assign(projected.nonlinear(), 1.0);

@@ -35,17 +35,18 @@ std::vector<double> parameter_grid(const ParameterRange& range, std::size_t coun
 // parameters are eliminated at each step; Jacobian after Kaufman), from the values in `terms`, within their ranges.
 // Writes the result into `terms`. Returns the weighted sum of squares.
 double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening);
+                        const NoiseCovariance& error_covariance);
 // The same to a relative change of the sum below `tolerance`. Where `coarse`
 // (RegressionProblem::decimated) is given, the search begins on that.
 double refine_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                        const NoiseCovariance& whitening, double tolerance, const RegressionProblem* coarse = nullptr);
+                        const NoiseCovariance& error_covariance, double tolerance,
+                        const RegressionProblem* coarse = nullptr);
 
 // Chooses starting values for nonlinear parameters that the model does not state: sweeps each over its grid, twice
 // around; from the usual ones or the middle of their ranges, or from those that `terms` has, which stay where none is
 // better.
 enum class SweepFrom { usual, values };
 void sweep_nonlinear(const RegressionProblem& data, Terms& terms, const std::vector<std::size_t>& on_balance,
-                     const NoiseCovariance& whitening, SweepFrom from = SweepFrom::usual);
+                     const NoiseCovariance& error_covariance, SweepFrom from = SweepFrom::usual);
 
 }  // namespace flexspline::estimation

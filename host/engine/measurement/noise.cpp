@@ -60,7 +60,7 @@ NoiseLevel noise_by_periods(const Channel& channel, const Period& period, double
   for (std::size_t p = 1; p < cut.values.size(); ++p) {
     std::vector<double> d = cut.values[p];
     for (std::size_t k = 0; k < d.size(); ++k) d[k] -= cut.values[p - 1][k];
-    take_out_line(d);
+    remove_linear_trend(d);
     const auto n = static_cast<double>(d.size());
     // The difference holds the noise of both periods.
     const double share = 1.0 / ((cut.noise_gain[p] + cut.noise_gain[p - 1]) * pairs);
@@ -87,7 +87,7 @@ NoiseLevel noise_at_rest(const Channel& channel, std::span<const data::Segment> 
     std::vector<double> x(channel.values.begin() + static_cast<std::ptrdiff_t>(s.first + 1),
                           channel.values.begin() + static_cast<std::ptrdiff_t>(s.last));
     level.signal_rms += rms_around_mean(x) * rms_around_mean(x) * static_cast<double>(x.size());
-    take_out_line(x);
+    remove_linear_trend(x);
     squares += mean_square(x) * static_cast<double>(x.size());
     freedoms += static_cast<double>(x.size()) - 2.0;
     samples += static_cast<double>(x.size());

@@ -127,7 +127,7 @@ std::size_t settled(const Experiment& e, const Period& period) {
     for (std::size_t p = 1; p < cut.values.size(); ++p) {
       std::vector<double> d = cut.values[p];
       for (std::size_t k = 0; k < d.size(); ++k) d[k] -= cut.values[p - 1][k];
-      take_out_line(d);
+      remove_linear_trend(d);
       double sum = 0.0;
       for (const double v : d) sum += v * v;
       change.push_back(sum);
@@ -182,7 +182,7 @@ PeriodSearch find_period(const Experiment& e, std::optional<double> period_s) {
   return {p, ""};
 }
 
-void take_out_line(std::vector<double>& x) {
+void remove_linear_trend(std::vector<double>& x) {
   const auto n = static_cast<double>(x.size());
   const double middle = 0.5 * (n - 1.0);
   double mean = 0.0, slope = 0.0;

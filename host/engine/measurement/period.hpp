@@ -39,7 +39,7 @@ struct PeriodSearch {
 PeriodSearch find_period(const data::Experiment& experiment, std::optional<double> period_s = std::nullopt);
 
 // Removes the linear trend (least squares), and with it two degrees of freedom.
-void take_out_line(std::vector<double>& signal);
+void remove_linear_trend(std::vector<double>& signal);
 
 // The periods of a signal, one after the other. A period between samples is cut by cubic interpolation.
 struct Periods {

@@ -12,13 +12,13 @@
 namespace flexspline::planning {
 namespace {
 
-// Above this margin less trouble counts more than more margin.
+// Above this margin less operator_effort counts more than more margin.
 constexpr double kEnough = 10.0 * kDistinguished;
 // A motion that improves the result by less than a fifth is not worth its time.
 constexpr double kWorthwhile = 1.2;
 // Relative standard deviation at which a parameter is known well enough.
 constexpr double kPrecisePercent = 1.0;
-// Cost of one unit of trouble, in seconds of recording.
+// Cost of one unit of operator_effort, in seconds of recording.
 constexpr double kTrouble_s = 15.0;
 
 // Factors of one balance: of what was recorded, and of each motion.
@@ -30,7 +30,7 @@ struct Factors {
 
 std::vector<Factors> factors_of(RehearsedMotions& rehearsed, const ColumnLayout& layout) {
   std::vector<Factors> all;
-  for (const RehearsedMotions::Side& side : rehearsed.sides()) {
+  for (const RehearsedMotions::BalanceData& side : rehearsed.balances()) {
     Factors f;
     f.noise = side.noise;
     if (side.recorded) {
@@ -40,7 +40,7 @@ std::vector<Factors> factors_of(RehearsedMotions& rehearsed, const ColumnLayout&
       f.recorded = stacked_factor(list);
     }
     auto parts = factors(*side.planned, layout.over(*side.planned));
-    for (std::size_t i = 0; i < parts.size(); ++i) parts[i] /= side.louder[i];
+    for (std::size_t i = 0; i < parts.size(); ++i) parts[i] /= side.relative_noise[i];
     for (std::size_t m = 0; m < rehearsed.motions().size(); ++m) {
       std::vector<const Eigen::MatrixXd*> list;
       for (std::size_t r = 0; r < rehearsed.motions()[m].runs.size(); ++r)
@@ -58,8 +58,8 @@ Eigen::MatrixXd with(const Factors& f, const std::vector<std::size_t>& chosen) {
   return stacked_factor(list);
 }
 
-double beats(const std::vector<Eigen::MatrixXd>& totals, const std::vector<Factors>& all, const EffectHypothesis& truth,
-             const EffectHypothesis& other) {
+double expected_likelihood_ratio(const std::vector<Eigen::MatrixXd>& totals, const std::vector<Factors>& all,
+                                 const EffectHypothesis& truth, const EffectHypothesis& other) {
   double least = 1e300;
   for (const Hypothesis& variant : other.variants) {
     double sum = 0.0;
@@ -73,7 +73,7 @@ Separation separation(const std::vector<Factors>& all, const std::vector<std::si
                       const EffectHypothesis& a, const EffectHypothesis& b) {
   std::vector<Eigen::MatrixXd> totals;
   for (const Factors& f : all) totals.push_back(with(f, chosen));
-  return {beats(totals, all, a, b), beats(totals, all, b, a)};
+  return {expected_likelihood_ratio(totals, all, a, b), expected_likelihood_ratio(totals, all, b, a)};
 }
 
 // The worse of the two decides; identifying one of them is an intermediate step, where neither alone shows the other.
@@ -87,11 +87,12 @@ double duration(const Motion& motion) {
   return sum;
 }
 
-Design begin(const PlanRequest& question, const RehearsedMotions& rehearsed) {
+Design begin(const PlanRequest& request, const RehearsedMotions& rehearsed) {
   Design design;
+  design.axis = rehearsed.model().drive.axis;
   design.plan.model = rehearsed.model().name;
-  design.plan.sample_s = question.sample_s;
-  design.plan.limits = question.setting.limits;
+  design.plan.sample_s = request.sample_s;
+  design.plan.limits = request.setting.limits;
   if (rehearsed.identified()) design.warnings = rehearsed.identified()->warnings;
   return design;
 }
@@ -106,8 +107,8 @@ void take(const RehearsedMotions& rehearsed, const std::vector<std::size_t>& cho
 
 // Motions that may still be taken.
 std::vector<std::size_t> open_motions(const RehearsedMotions& rehearsed, const std::vector<std::size_t>& chosen,
-                                      const PlanRequest& question) {
-  double left = question.setting.limits.duration_s;
+                                      const PlanRequest& request) {
+  double left = request.setting.limits.duration_s;
   for (const std::size_t m : chosen) left -= duration(rehearsed.motions()[m]);
   std::vector<std::size_t> open;
   for (std::size_t m = 0; m < rehearsed.motions().size(); ++m)
@@ -190,31 +191,31 @@ double log_determinant(const Eigen::MatrixXd& information) {
 
 }  // namespace
 
-Design separate(const PlanRequest& question, std::string_view first, std::string_view second) {
-  RehearsedMotions rehearsed(question);
-  if (question.progress) question.progress("comparing the effects on all motions");
+Design discriminate(const PlanRequest& request, std::string_view first, std::string_view second) {
+  RehearsedMotions rehearsed(request);
+  if (request.progress) request.progress("comparing the effects on all motions");
   ColumnLayout layout;
   // An effect that the model has already is one of the two that may be missing.
   const Terms base = without(without(rehearsed.terms(), first), second);
   const EffectHypothesis a = effect_hypothesis(rehearsed, layout, base, first),
                          b = effect_hypothesis(rehearsed, layout, base, second);
-  Design design = begin(question, rehearsed);
+  Design design = begin(request, rehearsed);
   design.plan.separate = {a.label, b.label};
   const std::vector<Factors> all = factors_of(rehearsed, layout);
   std::vector<std::size_t> chosen;
   if (rehearsed.identified()) design.before = separation(all, {}, a, b);
   design.after = design.before.value_or(Separation{});
-  while (chosen.size() < question.most_motions && design.after->worst() < kEnough) {
+  while (chosen.size() < request.most_motions && design.after->worst() < kEnough) {
     std::optional<std::size_t> best;
     double most = -1e300;
     Separation reached;
-    for (const std::size_t m : open_motions(rehearsed, chosen, question)) {
+    for (const std::size_t m : open_motions(rehearsed, chosen, request)) {
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
       const Separation s = separation(all, more, a, b);
       if (progress(s) < kWorthwhile * std::max(progress(*design.after), 1e-3)) continue;
-      // Above the required margin, the motion with the least trouble is chosen.
-      const double merit = std::log(std::min(progress(s), kEnough)) - 0.3 * rehearsed.motions()[m].trouble +
+      // Above the required margin, the motion with the least operator_effort is chosen.
+      const double merit = std::log(std::min(progress(s), kEnough)) - 0.3 * rehearsed.motions()[m].operator_effort +
                            0.01 * std::log(progress(s));
       if (merit > most) {
         most = merit;
@@ -227,14 +228,14 @@ Design separate(const PlanRequest& question, std::string_view first, std::string
     design.after = reached;
   }
   const auto size = [](const EffectHypothesis& c) {
-    return fmt::format(
-        "{} {}", c.label,
-        c.seen ? "as large as the data show it" : "as large as it can be unseen, at most of its usual size");
+    return fmt::format("{} {}", c.label,
+                       c.seen ? "as large as the data show it"
+                              : "at the largest size that these data would not show, at most its usual one");
   };
   if (design.after->worst() < kDistinguished) {
     design.plan.notes.push_back(
         fmt::format("No motion within these limits distinguishes {} from {} (expected margin {:.3g}; {:.0f} would be "
-                    "needed): name them together.",
+                    "needed): report both as alternatives.",
                     a.label, b.label, design.after->worst(), kDistinguished));
     return design;
   }
@@ -245,13 +246,13 @@ Design separate(const PlanRequest& question, std::string_view first, std::string
   return design;
 }
 
-Design excite(const PlanRequest& question) {
-  RehearsedMotions rehearsed(question);
-  if (question.progress) question.progress("choosing motions");
+Design d_optimal(const PlanRequest& request) {
+  RehearsedMotions rehearsed(request);
+  if (request.progress) request.progress("choosing motions");
   ColumnLayout layout;
   const Hypothesis model = layout.add(rehearsed.terms());
   const Parameters parameters(rehearsed, model);
-  Design design = begin(question, rehearsed);
+  Design design = begin(request, rehearsed);
   const std::vector<Factors> all = factors_of(rehearsed, layout);
   design.parameters = parameters.list();
   std::vector<std::size_t> chosen;
@@ -264,18 +265,18 @@ Design excite(const PlanRequest& question) {
     const auto now = Parameters::percent(information);
     return std::all_of(now.begin(), now.end(), [](const auto& p) { return p && *p < kPrecisePercent; });
   };
-  while (chosen.size() < question.most_motions && !precise()) {
+  while (chosen.size() < request.most_motions && !precise()) {
     const double now = log_determinant(information);
     std::optional<std::size_t> best;
     double most = 0.0;
-    for (const std::size_t m : open_motions(rehearsed, chosen, question)) {
+    for (const std::size_t m : open_motions(rehearsed, chosen, request)) {
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
       const double gain = log_determinant(parameters.information(all, more)) - now;
       // A motion must reduce the volume of the confidence ellipsoid by at least a factor e; then the gain per time
       // decides.
       const Motion& motion = rehearsed.motions()[m];
-      const double merit = gain > 1.0 ? gain / (duration(motion) + kTrouble_s * motion.trouble) : 0.0;
+      const double merit = gain > 1.0 ? gain / (duration(motion) + kTrouble_s * motion.operator_effort) : 0.0;
       if (merit > most) {
         most = merit;
         best = m;

@@ -53,21 +53,24 @@ struct Precision {
 
 struct Design {
   Plan plan;
+  data::Axis axis = data::Axis::rotary;  // of the model: rad and rad/s, or m and m/s
   std::optional<Separation> before, after;
   std::vector<Precision> parameters;  // of a plan that excites undetermined parameters
   std::vector<std::string> warnings;
-  // Of each run of the plan, as rehearsed.
+  // Of each run of the plan, as rehearsed; position and velocity in the axis's units.
   struct Peak {
     double current_a = 0.0, velocity_rad_s = 0.0, travel_rad = 0.0;
   };
   std::vector<Peak> peaks;
 };
 
-// The model need have values only where there are no data to identify it on. Throws model::ModelError for effects that
-// cannot be added, simulation::ModelIncomplete, data::DataError, PlanError where no motion stays within the limits.
-Design separate(const PlanRequest& question, std::string_view first, std::string_view second);
-// D-optimal: each motion in turn is the one that most increases the determinant of the information on all parameters,
-// each relative to its value.
-Design excite(const PlanRequest& question);
+// T-optimal design for two models (Atkinson and Fedorov 1975), greedily: each motion in turn most increases the smaller
+// of both noncentralities. The model need have values only where there are no data to identify it on. Throws
+// model::ModelError for effects that cannot be added, simulation::ModelIncomplete, data::DataError, PlanError where no
+// motion stays within the limits.
+Design discriminate(const PlanRequest& request, std::string_view first, std::string_view second);
+// Sequential D-optimal design (Fedorov 1972): each motion in turn is the one that most increases the determinant of the
+// information on all parameters, each relative to its value.
+Design d_optimal(const PlanRequest& request);
 
 }  // namespace flexspline::planning

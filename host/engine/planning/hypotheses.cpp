@@ -17,8 +17,8 @@ using estimation::Term;
 
 constexpr std::size_t kGridPoints = 7;
 
-RehearsedMotions::Side* side_of(RehearsedMotions& rehearsed, Balance balance) {
-  for (RehearsedMotions::Side& side : rehearsed.sides())
+RehearsedMotions::BalanceData* side_of(RehearsedMotions& rehearsed, Balance balance) {
+  for (RehearsedMotions::BalanceData& side : rehearsed.balances())
     if (side.planned->balance() == balance) return &side;
   return nullptr;
 }
@@ -116,7 +116,7 @@ EffectHypothesis effect_hypothesis(RehearsedMotions& rehearsed, ColumnLayout& la
   EffectHypothesis c;
   c.label = std::string(effect);
   Terms base = selection::extend(model, *name.entry, name.order);
-  RehearsedMotions::Side* side = side_of(rehearsed, name.entry->identified_on());
+  RehearsedMotions::BalanceData* side = side_of(rehearsed, name.entry->identified_on());
   if (!side) side = side_of(rehearsed, Balance::motor);
   if (side) estimation::set_grid_values(*side->planned, base, {base.size() - 1});
 

@@ -23,8 +23,8 @@ struct EffectHypothesis {
 Terms without(const Terms& terms, std::string_view effect);
 
 // `base` is the model with neither of the two; an effect that the rehearsed model has keeps the size that it has there.
-// `noise` of the sides is lowered to what the model with the effect leaves. Throws model::ModelError where the effect
-// cannot be added to the model.
+// `noise` of the balances is lowered to what the model with the effect leaves. Throws model::ModelError where the
+// effect cannot be added to the model.
 EffectHypothesis effect_hypothesis(RehearsedMotions& rehearsed, ColumnLayout& layout, const Terms& base,
                                    std::string_view effect);
 

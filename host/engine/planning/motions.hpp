@@ -26,7 +26,8 @@ struct MotionSettings {
 struct Motion {
   std::string name;
   std::vector<Run> runs;
-  double trouble = 0.0;  // the effort for a person: 0 nothing, 1 a lock or a switch, 2 a weight, 3 waiting for heat
+  double operator_effort =
+      0.0;  // the effort for a person: 0 nothing, 1 a lock or a switch, 2 a weight, 3 waiting for heat
 };
 
 // Amplitudes are as large as the limits let them be, or a stated part of that. Deterministic.

@@ -52,7 +52,7 @@ double stated_noise(const model::Drive& drive, const estimation::PreparedData& p
 }
 
 // The size of a balance's signals in a record; the noise of sensors often grows with the signal.
-double loudness(const estimation::PreparedData& prepared, const estimation::Record& record, Balance balance) {
+double noise_level(const estimation::PreparedData& prepared, const estimation::Record& record, Balance balance) {
   double sum = 0.0;
   const double gear = balance == Balance::motor ? prepared.constants.gear_ratio : 1.0;
   for (std::size_t k = 0; k < record.inputs.size(); ++k) {
@@ -63,10 +63,10 @@ double loudness(const estimation::PreparedData& prepared, const estimation::Reco
   return std::sqrt(sum / std::max(1.0, static_cast<double>(record.inputs.size())));
 }
 
-double loudness(const RegressionProblem& data) {
+double noise_level(const RegressionProblem& data) {
   double sum = 0.0, rows = 0.0;
   for (const estimation::RowRange& range : data.records()) {
-    const double one = loudness(data.prepared(), data.prepared().records[range.record], data.balance());
+    const double one = noise_level(data.prepared(), data.prepared().records[range.record], data.balance());
     sum += one * one * static_cast<double>(range.size());
     rows += static_cast<double>(range.size());
   }
@@ -127,39 +127,39 @@ MotionSettings setting_of(const model::Model& model, const data::Dataset* datase
   return setting;
 }
 
-RehearsedMotions::RehearsedMotions(const PlanRequest& question) {
-  if (question.dataset) {
-    if (question.progress) question.progress("fitting the model");
-    identified_ = estimation::identify(*question.dataset, *question.model, question.pipeline);
+RehearsedMotions::RehearsedMotions(const PlanRequest& request) {
+  if (request.dataset) {
+    if (request.progress) request.progress("fitting the model");
+    identified_ = estimation::identify(*request.dataset, *request.model, request.pipeline);
     model_ = identified_->model;
     terms_ = identified_->terms;
   } else {
-    model_ = *question.model;
+    model_ = *request.model;
     if (!complete(model_))
       throw simulation::ModelIncomplete(fmt::format(
           "the model {} has parameters without a value; run flexspline identify first, or give measurements",
           model_.name));
     terms_ = estimation::terms_of(model_);
   }
-  rehearse_all(question);
-  prepare(question);
+  rehearse_all(request);
+  prepare(request);
 }
 
-void RehearsedMotions::rehearse_all(const PlanRequest& question) {
-  if (question.progress) question.progress("rehearsing motions");
-  const Limits& limits = question.setting.limits;
+void RehearsedMotions::rehearse_all(const PlanRequest& request) {
+  if (request.progress) request.progress("rehearsing motions");
+  const Limits& limits = request.setting.limits;
   std::string why = "there is none";
-  for (Motion& motion : planning::motions(question.setting)) {
+  for (Motion& motion : planning::motions(request.setting)) {
     std::vector<Design::Peak> peaks;
     std::vector<data::Experiment> experiments;
     for (Run& run : motion.runs) {
-      Rehearsal made = rehearse(model_, run, question.sample_s, limits, question.sensors);
+      Rehearsal made = rehearse(model_, run, request.sample_s, limits, request.sensors);
       // Friction and inertia may need more current than allowed although the velocity is within its limit: reduce the
       // amplitude until it fits.
       std::string breaks = broken_limit(made, limits);
       for (int shrunk = 0; !breaks.empty() && shrunk < kShrinkings && run.amplitude > 0.0; ++shrunk) {
         run.amplitude *= kShrinking;
-        made = rehearse(model_, run, question.sample_s, limits, question.sensors);
+        made = rehearse(model_, run, request.sample_s, limits, request.sensors);
         breaks = broken_limit(made, limits);
       }
       if (!breaks.empty()) {
@@ -182,13 +182,13 @@ void RehearsedMotions::rehearse_all(const PlanRequest& question) {
                     why));
 }
 
-void RehearsedMotions::prepare(const PlanRequest& question) {
+void RehearsedMotions::prepare(const PlanRequest& request) {
   std::vector<const data::Experiment*> list;
   for (const data::Experiment& e : experiments_) list.push_back(&e);
   prepared_ = identified_ ? estimation::prepare_with(list, model_.drive, identified_->prepared.pipeline)
-                          : estimation::prepare(list, model_, question.pipeline);
+                          : estimation::prepare(list, model_, request.pipeline);
   for (const Balance balance : {Balance::motor, Balance::transmission, Balance::load}) {
-    Side side;
+    BalanceData side;
     if (identified_) {
       for (std::size_t i = 0; i < identified_->data.size(); ++i)
         if (identified_->data[i].balance() == balance) {
@@ -202,14 +202,14 @@ void RehearsedMotions::prepare(const PlanRequest& question) {
     if (side.planned->empty()) continue;
     if (balance != Balance::motor && !prepared_.output_signals.torque) continue;
     if (!identified_)
-      side.noise = stated_noise(model_.drive, prepared_, balance, question.sample_s) *
+      side.noise = stated_noise(model_.drive, prepared_, balance, request.sample_s) *
                    side.planned->filter_autocorrelation_time();
     side.noise = std::max(side.noise, 1e-30);
-    side.louder.assign(prepared_.records.size(), 1.0);
-    const double known = side.recorded ? loudness(*side.recorded) : 0.0;
+    side.relative_noise.assign(prepared_.records.size(), 1.0);
+    const double known = side.recorded ? noise_level(*side.recorded) : 0.0;
     for (std::size_t i = 0; known > 0.0 && i < prepared_.records.size(); ++i)
-      side.louder[i] = std::max(1.0, loudness(prepared_, prepared_.records[i], balance) / known);
-    sides_.push_back(std::move(side));
+      side.relative_noise[i] = std::max(1.0, noise_level(prepared_, prepared_.records[i], balance) / known);
+    balances_.push_back(std::move(side));
   }
 }
 

@@ -13,7 +13,7 @@ namespace flexspline::planning {
 class RehearsedMotions {
  public:
   // Identifies the model where there are data, rehearses all motions, drops those that break a limit.
-  explicit RehearsedMotions(const PlanRequest& question);
+  explicit RehearsedMotions(const PlanRequest& request);
 
   const model::Model& model() const { return model_; }
   const estimation::Identification* identified() const { return identified_.get(); }
@@ -23,19 +23,19 @@ class RehearsedMotions {
   Design::Peak peak(std::size_t motion, std::size_t run) const { return peaks_[motion][run]; }
 
   // One balance, over the rehearsed motions and over the data.
-  struct Side {
+  struct BalanceData {
     std::unique_ptr<RegressionProblem> planned;
     const RegressionProblem* recorded = nullptr;  // null where there are no data
-    std::vector<double> louder;                   // noise of each planned record over that of the recorded data
-    double noise = 1.0;  // squares per sample of the residual of a true model, times the autocorrelation time
+    std::vector<double> relative_noise;           // noise of each planned record over that of the recorded data
+    double noise = 1.0;  // variance of the residual of a true model times its autocorrelation time, (N m)^2
   };
-  std::vector<Side>& sides() { return sides_; }
+  std::vector<BalanceData>& balances() { return balances_; }
   // Prepared record of a motion's first run; the others follow.
   std::size_t first_record(std::size_t motion) const { return first_record_[motion]; }
 
  private:
-  void rehearse_all(const PlanRequest& question);
-  void prepare(const PlanRequest& question);
+  void rehearse_all(const PlanRequest& request);
+  void prepare(const PlanRequest& request);
 
   model::Model model_;
   std::unique_ptr<estimation::Identification> identified_;
@@ -45,7 +45,7 @@ class RehearsedMotions {
   std::vector<std::size_t> first_record_;
   std::vector<data::Experiment> experiments_;
   estimation::PreparedData prepared_;
-  std::vector<Side> sides_;
+  std::vector<BalanceData> balances_;
 };
 
 }  // namespace flexspline::planning

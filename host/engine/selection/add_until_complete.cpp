@@ -26,8 +26,8 @@ std::string label(const NamedEffect& named) {
 
 }  // namespace
 
-std::string needless(const data::Dataset& dataset, const model::Model& model, const std::vector<std::string>& ids,
-                     const Options& options) {
+std::string least_significant_effect(const data::Dataset& dataset, const model::Model& model,
+                                     const std::vector<std::string>& ids, const Options& options) {
   const auto fitted = estimation::identify(dataset, model, options.pipeline);
   std::string worst;
   double least = kPolicy.named_score;
@@ -57,9 +57,9 @@ std::string needless(const data::Dataset& dataset, const model::Model& model, co
   return worst;
 }
 
-Completion add_until_complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
-                              std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress) {
-  Completion result;
+StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::Model& model, const Options& options,
+                                     std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress) {
+  StepwiseSelection result;
   result.model = model;
   std::vector<std::string> added;               // ids
   std::map<std::string, std::string> label_of;  // by id
@@ -84,11 +84,11 @@ Completion add_until_complete(const data::Dataset& dataset, const model::Model& 
     if (added.size() < 2) continue;
     // The newest was just named with the others in the model; only those are tried.
     const std::vector<std::string> before(added.begin(), added.end() - 1);
-    const std::string out = needless(dataset, result.model, before, options);
+    const std::string out = least_significant_effect(dataset, result.model, before, options);
     if (out.empty()) continue;
     result.model = remove(dataset, result.model, out, options.pipeline).model;
     std::erase(added, out);
-    // It was named before and removed as needless. Naming it again would be an endless loop.
+    // It was named before and removed as least_significant_effect. Naming it again would be an endless loop.
     const bool again = std::find(result.removed.begin(), result.removed.end(), label_of[out]) != result.removed.end();
     if (again) return result;
     result.removed.push_back(label_of[out]);

@@ -15,8 +15,9 @@ struct Bandwidth {
   std::string reason;
 };
 
-// Standard deviation of white noise on a position, from its fourth differences, which a smooth motion does not reach:
-// sqrt(70) times the noise. Segments of fewer than five samples are left out; 0 where none is longer.
+// Standard deviation of white noise on a position, from its fourth differences (a difference-based estimator): those
+// of white noise have the standard deviation sqrt(70) sigma, those of a smooth motion are negligible. Segments of fewer
+// than five samples are left out; 0 where none is longer.
 double noise_by_fourth_differences(const std::vector<double>& position, const std::vector<data::Segment>& segments);
 
 // Never above an eighth of the lowest sample rate.

@@ -24,7 +24,7 @@ using Possible = std::vector<std::pair<MetaRegression, const Law*>>;
 
 // The best values of each law that the sign of friction allows in these records, likeliest law first; of a family the
 // first.
-Possible possible(const RecordFriction& own, const std::vector<Law>& laws, const Part& part) {
+Possible possible(const RecordFriction& own, const std::vector<Law>& laws, const RecordSubset& part) {
   Possible best;
   const RecordParameters values = part(own.values);
   for (const Law& law : laws) {
@@ -99,10 +99,10 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
   std::vector<double> speeds;
   for (const estimation::RowRange& range : own.records)
     speeds.push_back(rms_speed(base.prepared.records[range.record]));
-  const std::vector<Part> ranges = ranges_of_speed(own, speeds);
-  const Part* chosen = nullptr;
+  const std::vector<RecordSubset> ranges = ranges_of_speed(own, speeds);
+  const RecordSubset* chosen = nullptr;
   Possible best;
-  for (const Part& range : ranges)
+  for (const RecordSubset& range : ranges)
     if (Possible here = possible(own, laws, range);
         !here.empty() && (!chosen || here.front().first.likelihood_ratio > best.front().first.likelihood_ratio)) {
       chosen = &range;
@@ -118,6 +118,7 @@ std::optional<LawInRange> law_in_range(const estimation::Identification& base, c
   found.explained_percent = 100.0 * best.front().first.explained_share;
   found.lowest_speed = speeds[static_cast<std::size_t>(chosen->records.front())];
   found.highest_speed = speeds[static_cast<std::size_t>(chosen->records.back())];
+  found.speed_unit = base.prepared.rotary ? "rad/s" : "m/s";
   return found;
 }
 
@@ -132,7 +133,7 @@ void name_between_records(const estimation::Identification& base, const estimati
   const std::vector<Law> all = laws(base, motor, own);
   std::vector<Eigen::MatrixXd> added;
   for (const Law& law : all) added.push_back(law.added);
-  const Part whole = whole_of(own.values);
+  const RecordSubset whole = every_record(own.values);
   // So many that the limit is twenty permutations, known to a fifth.
   const auto permutations = static_cast<int>(20.0 / kPolicy.trend_p_value);
   const double p_value = permutation_p_value(own.values, added, {whole}, permutations, 1);

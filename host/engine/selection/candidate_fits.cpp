@@ -230,7 +230,7 @@ void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candida
   while (!candidates.empty() && passes(candidates.front()) && !is_worth_a_term(search, candidates.front())) {
     CandidateFit& first = candidates.front();
     first.admissible = false;
-    first.why_not = fmt::format("it takes only {:.1f} % off the squared error", explained_percent(first));
+    first.why_not = fmt::format("it reduces the squared error by only {:.1f} %", explained_percent(first));
     sort_candidates(search, candidates);
   }
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/candidate_models.hpp"
@@ -161,11 +162,11 @@ std::optional<double> most_at_peaks(const TableBuilder& builder, const Eigen::Ve
   const Eigen::VectorXd& effort = builder.sign.effort;
   std::vector<double> efforts, ratios;
   for (Eigen::Index k = 0; k < effort.size(); ++k) efforts.push_back(std::abs(effort[k]));
-  const double peak = quantile(efforts, 0.99);
-  if (peak < builder.policy.least_effort_range * quantile(efforts, 0.5)) return std::nullopt;
+  const double peak = numbers::quantile(efforts, 0.99);
+  if (peak < builder.policy.least_effort_range * numbers::quantile(efforts, 0.5)) return std::nullopt;
   for (Eigen::Index k = 0; k < effort.size(); ++k)
     if (std::abs(effort[k]) >= peak) ratios.push_back(std::abs(column[k] / effort[k]));
-  return builder.policy.most_of_effort / std::max(quantile(ratios, 0.5), 1e-300);
+  return builder.policy.most_of_effort / std::max(numbers::quantile(ratios, 0.5), 1e-300);
 }
 
 void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedColumns columns) {

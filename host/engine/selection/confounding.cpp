@@ -158,21 +158,21 @@ bool is_angle_confounded(const CandidateFit& first, const CandidateFit& second) 
 
 void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, const model::Drive& drive,
                    Diagnosis& result) {
-  const auto trial_of = [&](const NamedEffect& n) {
+  const auto candidate_of = [&](const NamedEffect& n) {
     return std::find_if(candidates.begin(), candidates.end(), [&](const CandidateFit& t) {
       return t.model.entry->name() == n.effect && t.model.order == n.order;
     });
   };
   for (Candidate& c : result.candidates)
     for (const NamedEffect& n : result.named) {
-      if (c.effect != n.effect || c.order != n.order || trial_of(n) == candidates.end()) continue;
-      c.evidence = evidence(search, *trial_of(n), drive.axis);
-      const Eigen::VectorXd own = own_torque(search, *trial_of(n), search.base.root_weights);
+      if (c.effect != n.effect || c.order != n.order || candidate_of(n) == candidates.end()) continue;
+      c.evidence = evidence(search, *candidate_of(n), drive.axis);
+      const Eigen::VectorXd own = own_torque(search, *candidate_of(n), search.base.root_weights);
       c.size = size_of(search, own, drive);
       if (result.verdict != Verdict::confusable_effects) continue;
       for (const NamedEffect& other : result.named)
-        if (&other != &n && trial_of(other) != candidates.end())
-          c.confounding_reasons.push_back(compare(search, own, *trial_of(other)));
+        if (&other != &n && candidate_of(other) != candidates.end())
+          c.confounding_reasons.push_back(compare(search, own, *candidate_of(other)));
     }
 }
 

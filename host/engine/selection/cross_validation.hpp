@@ -94,7 +94,8 @@ NoiseCovariance noise_covariance(const RegressionProblem& data, const CrossValid
 double whitened_squares(const RegressionProblem& data, const Terms& terms, const CrossValidatedFit& fit);
 
 struct LikelihoodGain {
-  // Twice the log likelihood ratio of left-out samples over the autocorrelation time, less k ln(n_eff).
+  // Twice the log likelihood ratio of left-out samples over the autocorrelation time, less k ln(n_eff), the penalty of
+  // the BIC (Schwarz 1978); in addition to cross-validation it is a margin, calibrated with named_score.hpp.
   double score = 0.0;
   double chi2_percent = 0.0;           // of the left-out chi-square
   double fixed_effects_percent = 0.0;  // the same with one friction for all records

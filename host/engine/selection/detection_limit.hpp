@@ -1,4 +1,5 @@
-// The smallest effect that the data at hand would have shown.
+// The size of an effect at which its expected score equals the limit: one of that size is named in about half of such
+// data sets.
 #pragma once
 
 #include <optional>

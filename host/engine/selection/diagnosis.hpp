@@ -132,7 +132,8 @@ struct Resampling {
   bool torque_has_noise = false;  // of its sensor, so that what reads the measured torque also explains its noise
   bool too_little = false;        // there are not enough samples for halves
   double abstained = 0.0;         // saw nothing above the noise
-  double whiteness = 0.0;         // of what the best terms leave, reversals masked: 1 for noise, 0 for structure
+  // Von Neumann's ratio, halved, of what the best terms leave, reversals masked: 1 for noise, 0 for structure.
+  double von_neumann_ratio = 0.0;
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
   double lag_share = 0.0;                  // of the squares above the noise that taking it off removes
@@ -157,7 +158,8 @@ struct BetweenRecords {
 struct LawInRange {
   std::vector<std::string> effects;  // more than one: not distinguished
   std::size_t records = 0, of_records = 0;
-  double lowest_speed = 0.0, highest_speed = 0.0;  // rms of the records, rad/s
+  double lowest_speed = 0.0, highest_speed = 0.0;  // rms of the records, in speed_unit
+  std::string speed_unit;                          // rad/s, or m/s on a linear axis
   double explained_percent = 0.0;                  // of the variance between the records of the range
   double p_value = 1.0;                            // by permutation; that ranges were tried is counted
   double p_value_of_all = 1.0;                     // of the best law over all records

@@ -1,4 +1,5 @@
 #include "host/engine/selection/disturbances.hpp"
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/selection/policy.hpp"
 
 #include <algorithm>
@@ -16,14 +17,8 @@ using estimation::Record;
 using estimation::RegressionProblem;
 using estimation::RowRange;
 
-double median(std::vector<double> x) {
-  if (x.empty()) return 0.0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
-
-// The residual less a running median, which a burst does not change.
+// The residual less a running median, which a burst does not change. What is then beyond far_out robust standard
+// deviations is an outlier by the Hampel identifier (Hampel 1974).
 std::vector<double> without_slow_part(const Eigen::VectorXd& residual, const RowRange& range, std::size_t half_window) {
   const auto n = static_cast<std::size_t>(range.size());
   std::vector<double> fast(n), window;
@@ -124,7 +119,7 @@ std::optional<Outliers> outliers(const RegressionProblem& data, const Eigen::Vec
   Outliers found;
   found.size = without_slow_part(residual, range, static_cast<std::size_t>(std::ceil(kPolicy.longest_burst_s / row_s)));
   for (double& size : found.size) size = std::abs(size);
-  const double far = kPolicy.far_out * 1.4826 * median(found.size);
+  const double far = kPolicy.far_out * 1.4826 * numbers::upper_median(found.size);
   found.marked.resize(n);
   for (std::size_t k = 0; k < n; ++k) found.marked[k] = found.size[k] > far;
   const double share =

@@ -230,7 +230,7 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
   ForwardStep at(table, fit, validation, noise, policy);
   const double before = at.now().validation_squares;
   result.before = result.after = before;
-  if (before / validation.rows > policy.most_leverage * at.now().training_squares / fit.rows) {
+  if (before / validation.rows > policy.max_validation_to_training * at.now().training_squares / fit.rows) {
     result.abstains = result.extrapolates = true;
     return result;
   }

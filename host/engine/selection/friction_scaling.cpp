@@ -51,7 +51,7 @@ std::vector<Scaling> scalings(const estimation::Identification& base, const Regr
   for (const CandidateFit& candidate : candidates) {
     const catalogue::Entry& entry = *candidate.model.entry;
     if (!is_scaling(entry)) continue;
-    Part part{whole_of(own.values).records, {}};
+    RecordSubset part{every_record(own.values).records, {}};
     for (std::size_t j = 0; j < own.parameters.size(); ++j)
       if (base.terms[own.parameters[j]->ref.term].entry->name() == entry.info->modulates)
         part.parameters.push_back(static_cast<Eigen::Index>(j));
@@ -80,7 +80,7 @@ void list_as_possible(const NamedEffect& name, std::size_t records, double p_val
   });
   result.possible.push_back(
       {{name},
-       fmt::format("it shows between records only, and friction of {} records goes with it by chance with p = {:.2g}",
+       fmt::format("it shows between records only, and friction of {} records depends on it by chance with p = {:.2g}",
                    records, p_value),
        std::nullopt,
        std::nullopt});
@@ -99,7 +99,8 @@ void take_value(const Scaling& one, std::size_t records, double p_value, Candida
   candidate.admit();
   candidate.p_value = p_value;
   candidate.note = fmt::format(
-      "Found between records: friction of {} records goes with it (t = {:.3g}, {:.0f} degrees of freedom, p = {:.2g}). "
+      "Found between records: friction of {} records depends on it (t = {:.3g}, {:.0f} degrees of freedom, p = "
+      "{:.2g}). "
       "What else changed from record to record, such as wear-in over time, would look the same: repeat one motion cold "
       "and warm to make sure.",
       records, one.fit.t, one.fit.freedom, p_value);

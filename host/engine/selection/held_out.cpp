@@ -39,7 +39,7 @@ double most_growth(const CrossValidatedFit& base, const CrossValidatedFit& with)
   const auto differs = [](const CrossValidatedFit& fit) {
     return fit.random_effects.std.size() > 0 && fit.random_effects.std.maxCoeff() > 0.0;
   };
-  return differs(base) || differs(with) ? kPolicy.most_leverage : 1.0 + kPolicy.line_share;
+  return differs(base) || differs(with) ? kPolicy.max_held_out_growth : 1.0 + kPolicy.line_share;
 }
 
 }  // namespace

@@ -113,18 +113,18 @@ std::vector<std::vector<Eigen::Index>> strata_of(const Eigen::MatrixXd& variance
 
 }  // namespace
 
-Part whole_of(const RecordParameters& records) {
-  Part all;
+RecordSubset every_record(const RecordParameters& records) {
+  RecordSubset all;
   for (Eigen::Index i = 0; i < records.theta.rows(); ++i) all.records.push_back(i);
   for (Eigen::Index j = 0; j < records.theta.cols(); ++j) all.parameters.push_back(j);
   return all;
 }
 
 double permutation_p_value(const RecordParameters& records, const std::vector<Eigen::MatrixXd>& added,
-                           const std::vector<Part>& parts, int permutations, std::uint64_t seed) {
+                           const std::vector<RecordSubset>& parts, int permutations, std::uint64_t seed) {
   std::vector<RecordParameters> in_part;
   std::vector<Fitted> without;
-  for (const Part& part : parts) {
+  for (const RecordSubset& part : parts) {
     in_part.push_back(part(records));
     without.push_back(without_effect(in_part.back()));
   }
@@ -138,7 +138,7 @@ double permutation_p_value(const RecordParameters& records, const std::vector<Ei
     }
     return largest;
   };
-  std::vector<Eigen::Index> order = whole_of(records).records;
+  std::vector<Eigen::Index> order = every_record(records).records;
   const double recorded = best(order);
   if (recorded <= 0.0) return 1.0;
   const std::vector<std::vector<Eigen::Index>> strata = strata_of(records.variance);

@@ -38,7 +38,7 @@ MetaRegression meta_regression(const RecordParameters& records, const Eigen::Mat
 bool is_possible(const MetaRegression& fit);
 
 // Some of the records, and the parameters of which they are compared.
-struct Part {
+struct RecordSubset {
   std::vector<Eigen::Index> records, parameters;
 
   Eigen::MatrixXd operator()(const Eigen::MatrixXd& all) const { return all(records, parameters); }
@@ -50,9 +50,9 @@ struct Part {
 // searched for is then in the p-value: Hansen 1996). 1 where none is possible. Drawing ends after twenty that reach it
 // (Besag and Clifford 1991): then the share is known to a fifth.
 double permutation_p_value(const RecordParameters& records, const std::vector<Eigen::MatrixXd>& added,
-                           const std::vector<Part>& parts, int permutations, std::uint64_t seed);
+                           const std::vector<RecordSubset>& parts, int permutations, std::uint64_t seed);
 
-// The part that is all of them.
-Part whole_of(const RecordParameters& records);
+// The subset that is all of them.
+RecordSubset every_record(const RecordParameters& records);
 
 }  // namespace flexspline::selection

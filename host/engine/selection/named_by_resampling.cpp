@@ -87,11 +87,11 @@ bool explains_instead(const Resampling& resampling, const CandidateFit& first) {
 // missing, structure remains whatever is added, and a small decrease proves nothing. Where the noise floor is unknown,
 // the residual must be white, of three records or more, as what is peculiar to one motion may be white in its own
 // record; and an effect of the effort alone is not taken, as it may explain its own noise.
-bool leaves_noise(const SearchedBalance& e, double whiteness) {
+bool leaves_noise(const SearchedBalance& e, double von_neumann_ratio) {
   const CrossValidatedFit& fit = e.names_one() ? e.candidates.front().fit : e.search.base;
   if (e.floor.rmse) return fit.rmse() < kPolicy.at_floor * *e.floor.rmse;
   if (e.search.data->records().size() < estimation::kFewestRecords) return false;
-  return whiteness >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
+  return von_neumann_ratio >= kPolicy.white && !(e.names_one() && is_of_effort(e.candidates.front()));
 }
 
 // Whether the likelihood of all data is significant for an effect.
@@ -111,7 +111,7 @@ bool is_of_output_angle(const NamedEffect& name) {
 
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor) {
   const double frequency_of_all = found.frequency * (1.0 - resampling.abstained / resampling.subsamples);
-  const bool is_supported = frequency_of_all >= kPolicy.least_of_all || found.is_confirmed();
+  const bool is_supported = frequency_of_all >= kPolicy.min_frequency_of_all || found.is_confirmed();
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
@@ -219,7 +219,7 @@ std::string why_not_named(const Resampling::FoundTerm& term, bool is_undecided, 
   if (behind && term.group.size() > 1) return "its members cannot be distinguished, and what is named explains more";
   if (behind && term.share_percent < 100.0 * kPolicy.line_share)
     return fmt::format(
-        "it takes off {:.1f} % of the squared error above the noise, and {:.0f} % are needed behind "
+        "it explains {:.1f} % of the squared error above the noise, and {:.0f} % are needed behind "
         "another effect",
         term.share_percent, 100.0 * kPolicy.line_share);
   if (is_of_output_angle(term.group.front()))
@@ -362,7 +362,7 @@ bool resampling_decides(const Resampling& resampling, const SearchedBalance& mot
   // An effect built from the measured effort or from a noisy torque also explains its noise.
   if (!support && is_of_effort(first)) return true;
   if (resampling.torque_has_noise && is_of_torque(first)) return true;
-  return !leaves_noise(motor, resampling.whiteness);
+  return !leaves_noise(motor, resampling.von_neumann_ratio);
 }
 
 bool names_any(const Resampling& resampling, const SearchedBalance& motor) {

@@ -95,7 +95,7 @@ double score_on(BalanceSearch& other, CandidateFit& candidate, const Identified&
   const std::size_t added = terms.size() - 1;
   const double tau = std::max(1.0, other.base.autocorrelation_time);
   const Eigen::VectorXd residual = other.base.residual - data.term_torque(terms, added);
-  const estimation::Evidence evidence = estimation::evidence_of(
+  const estimation::ScoreAndInformation evidence = estimation::score_and_information(
       estimation::cross_balance_columns(data, terms, added, identified.parameters),
       estimation::model_columns(data, other.base.terms), residual, other.base.root_weights, tau);
   const estimation::CombinedEstimate both =

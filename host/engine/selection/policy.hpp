@@ -22,20 +22,20 @@ struct SelectionPolicy {
   // Noise of the inertia's torque over the residual, as variances: what noise of a regressor may add to the residual.
   double regressor_noise_share = 0.05;
 
-  // Resampling (Shah and Samworth 2013: complementary pairs, 50 of them).
+  // Resampling: complementary pairs (Shah and Samworth 2013, who use 50).
   std::size_t blocks = 24;
   std::size_t pairs = 48;                   // for each bandwidth and mask
   std::size_t fewest_records_to_split = 4;  // from so many on every second pair halves the records, not their blocks
   std::size_t most_steps = 4;
-  double named_frequency = 0.6;    // Meinshausen and Buehlmann 2010: 0.6 to 0.9
-  double least_of_all = 0.5;       // with abstaining subsamples counted as not choosing: the least that Meinshausen and
-                                   // Buehlmann's bound of false selections allows
-  double certain_frequency = 0.9;  // behind a structure that is in no catalogue
+  double named_frequency = 0.6;       // Meinshausen and Buehlmann 2010: 0.6 to 0.9
+  double min_frequency_of_all = 0.5;  // with abstaining subsamples counted as not choosing: the least that Meinshausen
+                                      // and Buehlmann's bound of false selections allows
+  double certain_frequency = 0.9;     // behind a structure that is in no catalogue
 
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.
   double line_share = 0.05;  // a linear term
   double law_share = 0.10;   // a term with nonlinear parameters
-  // Log-likelihood gain, in units of one: chance alone gives a term with two parameters 6 in one of 20 trials.
+  // Smallest log-likelihood gain: chance alone gives a term with two parameters 6 in one of 20 cases.
   double least_gain = 6.0;
   // A subsample without that share of its squares above the noise abstains.
   double least_excess = 0.03;
@@ -49,8 +49,11 @@ struct SelectionPolicy {
   double least_own_frequency = 0.3;  // of the first of a group
   double most_abstaining = 0.75;     // of the subsamples
 
-  double most_leverage = 3.0;  // error per sample of the half that judges over that of the half that fits: beyond, the
-                               // model itself does not carry over
+  // Squared error per sample of the half that validates over that of the half that fits: above, the model itself does
+  // not hold on other data.
+  double max_validation_to_training = 3.0;
+  // The same on held-out experiments, for a model whose friction differs between records.
+  double max_held_out_growth = 3.0;
 
   // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly: a prior worth that many records.
   double friction_difference = 0.03;
@@ -124,7 +127,8 @@ struct SelectionPolicy {
   double most_base_change = 0.5;
   double known_base_errors = 5.0;
   double known_base_over_missing = 2.0;
-  // Velocity over the end of its range (a quarter of the fast motion) from which on a negative law is wide (EFFECTS).
+  // Velocity over the end of its range (a quarter of the fast motion) from which on a negative law is wide
+  // (shared/effects/CATALOGUE.md).
   double wide_share_of_range = 0.4;
 
   // A law that contains another one fits at least as well. How much more the simpler one may leave: of the error itself

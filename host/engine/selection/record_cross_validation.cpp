@@ -49,7 +49,7 @@ std::string why_not(const BalanceSearch& search, const CandidateFit& candidate) 
   if (search.data->balance() == estimation::Balance::motor) return {};
   const RecordCrossValidation carried = cross_validate_by_record(search, candidate);
   if (!carried.is_refuted() && (!search.floor || search.at_floor(candidate.fit) || carried.is_certain())) return {};
-  return fmt::format("fitted without them, it predicts {} records worse than the model alone, and {} better{}",
+  return fmt::format("of the records left out of the fit it predicts {} worse than the model alone and {} better{}",
                      carried.worse, carried.better,
                      carried.is_refuted() ? "" : ", too few to be sure with an error that stays above the noise");
 }

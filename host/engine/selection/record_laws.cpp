@@ -84,15 +84,15 @@ RecordFriction friction_by_record(const estimation::Identification& base, const 
   return friction;
 }
 
-std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds) {
-  std::vector<Eigen::Index> order = whole_of(own.values).records;
+std::vector<RecordSubset> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds) {
+  std::vector<Eigen::Index> order = every_record(own.values).records;
   std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
     return speeds[static_cast<std::size_t>(a)] < speeds[static_cast<std::size_t>(b)];
   });
-  std::vector<Part> ranges;
+  std::vector<RecordSubset> ranges;
   const auto add = [&](auto first, auto last) {
-    Part range{{first, last}, {}};
-    for (const Eigen::Index j : whole_of(own.values).parameters) {
+    RecordSubset range{{first, last}, {}};
+    for (const Eigen::Index j : every_record(own.values).parameters) {
       const auto identify =
           std::count_if(first, last, [&](Eigen::Index i) { return std::isfinite(own.values.variance(i, j)); });
       if (static_cast<std::size_t>(identify) >= kPolicy.fewest_of_trend) range.parameters.push_back(j);

@@ -25,7 +25,7 @@ RecordFriction friction_by_record(const estimation::Identification& base, const 
 
 // The slower and the faster records, parted at each tenth of them; only those parts that identify a parameter as a
 // trend does. `speeds`: one a record.
-std::vector<Part> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds);
+std::vector<RecordSubset> ranges_of_speed(const RecordFriction& own, const std::vector<double>& speeds);
 
 // A law at one value of its nonlinear parameters: what it adds to the friction of each record.
 struct Law {

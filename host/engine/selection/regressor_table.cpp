@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/presliding.hpp"
 #include "host/engine/selection/table_builder.hpp"
@@ -105,7 +106,7 @@ double highest_order_hz(const PreparedData& prepared) {
     for (std::size_t k = 0; k < r.inputs.size() && !r.inputs.velocity.empty(); k += r.decimation)
       speeds.push_back(std::abs(r.inputs.velocity_at(k)));
   const bool turns = prepared.rotary || prepared.constants.turn_angle_scale != 1.0;
-  return turns ? highest_order(prepared.drive) * quantile(speeds, 0.5) * prepared.constants.turn_angle_scale /
+  return turns ? highest_order(prepared.drive) * numbers::quantile(speeds, 0.5) * prepared.constants.turn_angle_scale /
                      (2.0 * std::numbers::pi)
                : 0.0;
 }

@@ -129,16 +129,16 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   const Stability& stability = selection.result();
   Resampling result;
   if (const std::optional<TimeLag> lag = selection.time_lag(first_names(decide(stability, kPolicy)))) {
-    selection.take_off(*lag);
-    result.lag_s = lag->seconds;
-    result.lag_std_s = lag->std;
-    result.lag_share = lag->share;
+    selection.correct_lag(*lag);
+    result.lag_s = lag->lag_s;
+    result.lag_std_s = lag->std_s;
+    result.lag_share = lag->reduction_share;
   }
   result.subsamples = stability.subsamples;
   result.too_little = stability.subsamples == 0.0 && selection.tables().table.model_columns > 0;
   result.abstained = stability.abstained;
   result.torque_has_noise = selection.tables().torque_has_noise;
-  result.whiteness = stability.whiteness;
+  result.von_neumann_ratio = stability.von_neumann_ratio;
   result.highest_hz = selection.tables().bandwidth.highest_hz;
   result.lowest_hz =
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));

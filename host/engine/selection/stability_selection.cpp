@@ -7,6 +7,7 @@
 #include <random>
 #include <set>
 
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/selection/filtered_table.hpp"
@@ -16,16 +17,9 @@ namespace {
 
 constexpr std::uint64_t kSeed = 1234;
 
-double median(std::vector<double> x) {
-  if (x.empty()) return 0.0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
-
 double median_of_positive(std::vector<double> x) {
   std::erase_if(x, [](double v) { return !(v > 0.0); });
-  return x.empty() ? 1.0 : median(std::move(x));
+  return x.empty() ? 1.0 : numbers::upper_median(std::move(x));
 }
 
 }  // namespace
@@ -83,13 +77,13 @@ std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::strin
   const std::optional<TimeLag> lag =
       estimate_time_lag(tables_.table, terms, presliding ? Direction::presliding : Direction::sign,
                         has_wave ? LagRange::usual : LagRange::longest, policy_);
-  if (!lag || std::abs(lag->seconds) < policy_.delay_errors * lag->std || lag->share < policy_.line_share)
+  if (!lag || std::abs(lag->lag_s) < policy_.delay_errors * lag->std_s || lag->reduction_share < policy_.line_share)
     return std::nullopt;
   return lag;
 }
 
-void StabilitySelection::take_off(const TimeLag& lag) {
-  take_off_lag(tables_.table, lag.seconds);
+void StabilitySelection::correct_lag(const TimeLag& lag) {
+  correct_time_lag(tables_.table, lag.lag_s);
   estimation::in_parallel(samples_.size(), [&](std::size_t b) { filter_targets(tables_.table, samples_[b].table); });
   evaluate();
 }
@@ -116,7 +110,7 @@ Noise StabilitySelection::noise_of_best(const Setting& setting, const std::vecto
     for (const Run& run : setting.runs) ranges.push_back({run.record, run.first, run.last});
     noise.tau = std::max(2.0, estimation::autocorrelation_time(ranges, residual));
     const double left = residual.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, residual.size()));
-    result.whiteness = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
+    result.von_neumann_ratio = residual.size() > 0 ? noise.variance / std::max(left, 1e-300) : -1.0;
     if (result.columns.differences.empty() || round == 1) break;
     differences.noise = noise.tau * std::max(left, 1e-12);
     differences.variance = friction_effects_of(result.columns, setting, direction, weights, differences.noise, policy_);
@@ -291,11 +285,11 @@ void StabilitySelection::count() {
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)
-    if (tables_.settings[i].second && per_setting_[i].whiteness >= 0.0 &&
+    if (tables_.settings[i].second && per_setting_[i].von_neumann_ratio >= 0.0 &&
         tables_.settings[i].first <= 1.01 * tables_.bandwidth.highest_hz)
-      white.push_back(std::min(1.0, per_setting_[i].whiteness));
-  result_.explained = median(explained);
-  result_.whiteness = median(white);
+      white.push_back(std::min(1.0, per_setting_[i].von_neumann_ratio));
+  result_.explained = numbers::upper_median(explained);
+  result_.von_neumann_ratio = numbers::upper_median(white);
   for (auto& [name, c] : counts)
     if (c.was > 0.0 && c.all() > 0.0) result_.frequencies.push_back(frequency_of(c));
   std::sort(result_.frequencies.begin(), result_.frequencies.end(),
@@ -350,7 +344,7 @@ std::vector<double> StabilitySelection::held_out_ratios(const std::vector<std::s
   }
   std::vector<double> medians;
   for (const std::vector<double>& r : ratios)
-    if (!r.empty()) medians.push_back(median(r));
+    if (!r.empty()) medians.push_back(numbers::upper_median(r));
   return medians.size() == names.size() ? medians : std::vector<double>{};
 }
 

@@ -28,8 +28,9 @@ struct Stability {
   std::vector<Frequency> frequencies;  // largest first
   double subsamples = 0.0, abstained = 0.0;
   double extrapolated = 0.0;  // of the subsamples: the model alone does not carry over
-  double whiteness = 0.0;     // of what is left, reversals masked: semivariance over variance, median
-  double explained = 0.0;     // share of the excess that all steps take off, median
+  // Of what is left, reversals masked, halved: semivariance over variance (von Neumann 1941); median of the settings.
+  double von_neumann_ratio = 0.0;
+  double explained = 0.0;  // share of the excess that all steps take off, median
 };
 
 class StabilitySelection {
@@ -45,7 +46,7 @@ class StabilitySelection {
   // off as much as a term must.
   std::optional<TimeLag> time_lag(const std::vector<std::string>& names) const;
   // Selects again with that lag taken off the effort.
-  void take_off(const TimeLag& lag);
+  void correct_lag(const TimeLag& lag);
   // Selects again without the terms of these names.
   void leave_out(const std::vector<std::string>& names);
   bool is_left_out(const std::string& name) const { return left_out_.count(name) != 0; }
@@ -66,14 +67,15 @@ class StabilitySelection {
     std::vector<SelectionPath> votes;  // places of terms as in the whole table
     std::vector<int> terms;            // of the whole table, those that may be seen at this bandwidth
     RegressorTable columns;            // of these terms, without samples
-    double whiteness = -1.0;
+    double von_neumann_ratio = -1.0;
     HalfData all, held_out;
   };
 
   void filter_samples();
   SettingResult evaluate_setting(const BandwidthSamples& samples, bool mask, std::uint64_t seed) const;
   // Noise that the best model of all data leaves: first with the same friction in all records, then with random
-  // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the whiteness.
+  // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the
+  // von_neumann_ratio.
   Noise noise_of_best(const Setting& setting, const std::vector<double>& weights, FrictionRandomEffects& differences,
                       SettingResult& result) const;
   // Chooses on each of policy.pairs pairs of halves, in both directions.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/common/numbers/quantile.hpp"
 #include "host/common/signals/butterworth.hpp"
 
 namespace flexspline::selection {
@@ -60,16 +61,9 @@ Motion motion_of(const estimation::PreparedData& prepared) {
       if (k % r.decimation == 0) speeds.push_back(std::abs(r.inputs.velocity_at(k)));
     }
   motion.turn = 2.0 * std::numbers::pi / prepared.constants.turn_angle_scale;
-  motion.typical_speed = quantile(speeds, 0.5);
-  motion.top_speed = quantile(speeds, 0.95);
+  motion.typical_speed = numbers::quantile(speeds, 0.5);
+  motion.top_speed = numbers::quantile(speeds, 0.95);
   return motion;
-}
-
-double quantile(std::vector<double> x, double share) {
-  if (x.empty()) return 0.0;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(x.size() - 1));
-  std::nth_element(x.begin(), x.begin() + at, x.end());
-  return x[static_cast<std::size_t>(at)];
 }
 
 Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& runs) {

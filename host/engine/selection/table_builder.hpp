@@ -69,8 +69,6 @@ struct Motion {
 };
 Motion motion_of(const estimation::PreparedData& prepared);
 
-// Value below which that share of the numbers is; zero of none.
-double quantile(std::vector<double> x, double share);
 // Slope in time of a column, along each run.
 Eigen::VectorXd slope_of(const Eigen::VectorXd& column, const std::vector<Run>& runs);
 

@@ -88,17 +88,17 @@ LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& tab
   if (!(curvature > 0.0)) return {};
   const double step = lags[1] - lags[0];
   TimeLag lag;
-  lag.seconds = lags[static_cast<std::size_t>(best)] + 0.5 * step * (before - after) / curvature;
+  lag.lag_s = lags[static_cast<std::size_t>(best)] + 0.5 * step * (before - after) / curvature;
   std::vector<estimation::RowRange> ranges;
   for (const Run& run : setting.runs) ranges.push_back({run.record, run.first, run.last});
   const Eigen::VectorXd left = residuals.col(best);
   const double tau = std::max(1.0, estimation::autocorrelation_time(ranges, left));
   const double variance = left.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, left.size() - columns));
   // Squares over the lag are least + curvature/2 (lag/step)^2, and twice the variance is what one standard error adds.
-  lag.std = step * std::sqrt(2.0 * variance * tau / curvature);
+  lag.std_s = step * std::sqrt(2.0 * variance * tau / curvature);
   const double without = squares[tried / 2];
   const double floor = std::min(semivariance(setting, left) * static_cast<double>(left.size()), 0.999 * without);
-  lag.share = (without - least) / (without - floor);
+  lag.reduction_share = (without - least) / (without - floor);
   return {Found::inside, lag};
 }
 
@@ -118,7 +118,7 @@ std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std:
   }
 }
 
-void take_off_lag(RegressorTable& table, double lag_s) {
+void correct_time_lag(RegressorTable& table, double lag_s) {
   table.target = shifted(table.target, table.runs, lag_s);
   if (table.presliding) table.presliding->target = shifted(table.presliding->target, table.runs, lag_s);
 }

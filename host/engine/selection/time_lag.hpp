@@ -10,9 +10,9 @@
 namespace flexspline::selection {
 
 struct TimeLag {
-  double seconds = 0.0;  // positive: the effort comes later than the motion that it belongs to
-  double std = 0.0;      // s
-  double share = 0.0;    // of the squares above the noise that it takes off
+  double lag_s = 0.0;  // positive: the effort comes later than the motion that it belongs to
+  double std_s = 0.0;
+  double reduction_share = 0.0;  // of the squares above the noise, where the lag is corrected
 };
 
 enum class LagRange { usual, longest };
@@ -24,7 +24,7 @@ enum class LagRange { usual, longest };
 std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
                                          Direction direction, LagRange range, const SelectionPolicy& policy);
 
-// Takes a lag off the target.
-void take_off_lag(RegressorTable& table, double lag_s);
+// Shifts the target by a lag.
+void correct_time_lag(RegressorTable& table, double lag_s);
 
 }  // namespace flexspline::selection

@@ -129,8 +129,8 @@ std::string next_record(const UnknownStructure& unknown, const data::Axis axis) 
     if (unknown.depends_on[k].decrease_percent > 0.5 * unknown.depends_on.front().decrease_percent &&
         unknown.depends_on[k].variable.substr(0, unknown.depends_on[k].variable.find('*')) != v.name)
       others += fmt::format("{}{}", others.empty() ? "" : " and ", unknown.depends_on[k].variable);
-  if (!others.empty()) text += fmt::format("; and a motion in which {} does not go along with {}", v.name, others);
-  return text + "; then the same at another load or temperature, to see whether the curve stays";
+  if (!others.empty()) text += fmt::format("; and a motion in which {} and {} are not correlated", v.name, others);
+  return text + "; then the same at another load or temperature, to check whether the curve remains the same";
 }
 
 }  // namespace
@@ -166,7 +166,7 @@ std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, co
   for (const ScreenedCurve& s : learned)
     if (100.0 - s.curve.decrease_percent <
             (1.0 + kPolicy.simpler_curve) * (100.0 - learned.front().curve.decrease_percent) &&
-        s.curve.effective < best->curve.effective)
+        s.curve.effective_degrees_of_freedom < best->curve.effective_degrees_of_freedom)
       best = &s;
   if (!is_significant(best->curve)) return std::nullopt;
   UnknownStructure unknown;
@@ -225,7 +225,7 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
   if (named) {
     const CrossValidatedFit curve = with_curve(search, *unknown);
     const auto share = [&](const CandidateFit& candidate, double numbers) {
-      return share_of(search.base, candidate.fit, curve, unknown->curve.effective - numbers);
+      return share_of(search.base, candidate.fit, curve, unknown->curve.effective_degrees_of_freedom - numbers);
     };
     unknown->named_share_percent = 100.0 * share(*named, named->model.added);
     if (*unknown->named_share_percent >= 100.0 * kPolicy.curve_recovered) return;
@@ -242,8 +242,8 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
     }
     result.named.clear();
     result.remaining_structure = result.localised;
-  } else if (likelihood_gain(search.base, with_curve(search, *unknown), unknown->curve.effective).score <
-             kPolicy.curve_score) {
+  } else if (likelihood_gain(search.base, with_curve(search, *unknown), unknown->curve.effective_degrees_of_freedom)
+                 .score < kPolicy.curve_score) {
     // A curve that only one or two records show is their own friction.
     return;
   }

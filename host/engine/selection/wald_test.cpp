@@ -31,7 +31,7 @@ bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) 
 
 namespace {
 
-// The candidate of a name whose values do not differ from zero; null where they do, where no test can tell, or where
+// The candidate of a name whose values do not differ from zero; null where they do, where no test exists, or where
 // experiments that are held out confirm the name.
 Candidate* insignificant(Diagnosis& result, const NamedEffect& name) {
   const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),

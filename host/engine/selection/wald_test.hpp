@@ -1,4 +1,4 @@
-// Whether the values of an effect differ from zero (Wald's test), as its reader sees by the intervals.
+// Wald's test: whether the values of an effect differ from zero.
 #pragma once
 
 #include "host/engine/selection/diagnosis.hpp"
@@ -6,7 +6,7 @@
 namespace flexspline::selection {
 
 // Probability that chance alone gives values of a linear effect so far from zero: chi-square of all, taken as
-// independent, times the number of orders that were tried (Bonferroni). Nothing for a law with nonlinear parameters,
+// independent; of a wave times the number of usual orders (Bonferroni). Nothing for a law with nonlinear parameters,
 // which are no parameters where the effect is zero (Davies, 1977), and where no interval is known.
 std::optional<double> wald_p_value(const Candidate& candidate);
 

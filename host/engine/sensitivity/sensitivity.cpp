@@ -257,7 +257,7 @@ class Analysis {
         // A drive that is off is at rest: any motion is many times its own.
         if (!analysis_.prepared_.records[experiment].at_rest && s.growth > t->largest_growth) {
           t->largest_growth = s.growth;
-          t->error.most_in = variant.experiments[experiment].name;
+          t->error.worst_experiment = variant.experiments[experiment].name;
         }
       }
       variant.experiments[experiment].signals.push_back(std::move(s));

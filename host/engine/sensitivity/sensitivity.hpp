@@ -36,8 +36,8 @@ struct SignalError {
   double growth = kUnknown;  // of nrmse over the full model's; infinite where only the changed model diverges
   // At the strongest line of the motion. Over experiments: the mean that fits all of their sines best.
   Response response;
-  std::vector<Response> lines;  // of one experiment: all lines of its motion, the strongest first
-  std::string most_in;          // of all experiments: the one with the largest growth
+  std::vector<Response> lines;   // of one experiment: all lines of its motion, the strongest first
+  std::string worst_experiment;  // of all experiments: the one with the largest growth
 
   bool is_balance() const { return signal.ends_with("_balance"); }
   // Drift sums up in a position that nothing holds.

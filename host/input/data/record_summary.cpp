@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host/common/numbers/quantile.hpp"
 #include "host/common/signals/quantum.hpp"
 #include "host/input/data/period.hpp"
 
@@ -13,12 +14,7 @@ namespace {
 constexpr double kMovingShare = 0.01;    // of the largest speed
 constexpr double kReversalShare = 0.05;  // a change of sign counts once it reaches this share of the largest speed
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
+using numbers::quantile;
 
 // Third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance; motion hardly changes them.
 double noise_std(const std::vector<double>& x, const std::vector<Segment>& segments) {

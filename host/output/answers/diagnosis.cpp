@@ -64,7 +64,7 @@ std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
 }
 
 std::string candidate_table(const Diagnosis& d) {
-  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "would show from", ""},
+  Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "smallest detectable", ""},
               "rllrrrrlll");
   std::size_t rank = 0;
   for (const Candidate& c : d.candidates) {
@@ -134,8 +134,8 @@ void print_unknown(Console& console, const Diagnosis& d) {
   const selection::UnknownStructure& u = *d.unknown;
   console.line();
   console.line(
-      wrapped(fmt::format("It goes with {}{}: a curve over it takes {:.1f} % off the squared error on data left out of "
-                          "the fit (score {:.0f}). At the points that the data reach it is known to {}.",
+      wrapped(fmt::format("It depends on {}{}: a curve over it reduces the squared error on data left out of the fit "
+                          "by {:.1f} % (score {:.0f}). At the points that the data reach it is known to {}.",
                           u.definition.variable, u.definition.times_direction ? ", times the direction of motion" : "",
                           u.curve.decrease_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));
   if (u.named_share_percent && !d.candidates.empty())
@@ -168,11 +168,11 @@ bool has_same_names(const std::vector<selection::NamedEffect>& a, const std::vec
 
 std::string law_in_range_text(const selection::LawInRange& law) {
   return fmt::format(
-      "Friction of the {} records with an rms speed of {:.3g} to {:.3g} rad/s differs between them as {} says (p = "
+      "Friction of the {} records with an rms speed of {:.3g} to {:.3g} {} differs between them as {} says (p = "
       "{:.2g}, {:.0f} % of its variance). Over all {} records it does not (p = {:.2g}), so it is not named: what the "
       "others lack is something else, or the law ends there. Record one motion over the whole range of speeds.",
-      law.records, law.lowest_speed, law.highest_speed, listed(law.effects, "or"), law.p_value, law.explained_percent,
-      law.of_records, law.p_value_of_all);
+      law.records, law.lowest_speed, law.highest_speed, law.speed_unit, listed(law.effects, "or"), law.p_value,
+      law.explained_percent, law.of_records, law.p_value_of_all);
 }
 
 }  // namespace
@@ -200,10 +200,9 @@ std::string verdict_in_words(const Diagnosis& d) {
       return "Nothing is missing: the model's error is the noise of the measurement.";
     case Verdict::nothing_significant:
       if (!d.possible.empty())
-        return "No effect of the catalogue can be named; what may be missing is below. How large the noise is is not "
-               "known.";
-      return "No effect of the catalogue improves the model. How large the noise is is not known, so something small "
-             "may be missing.";
+        return "No effect of the catalogue can be named; what may be missing is below. The noise level is not known.";
+      return "No effect of the catalogue improves the model. The noise level is not known, so a small effect may be "
+             "missing.";
     case Verdict::unknown_structure:
       return "Something is missing that no effect of the catalogue explains.";
     case Verdict::insufficient_excitation:
@@ -266,11 +265,11 @@ std::string words(const std::vector<selection::NamedEffect>& group) {
 // What these data neither show nor rule out, and what to record.
 void print_possible(Console& console, const std::vector<selection::PossibleEffect>& possible) {
   for (const selection::PossibleEffect& one : possible) {
-    std::string text = fmt::format("Cannot tell whether {} is missing", words(one.group));
+    std::string text = fmt::format("These data do not decide whether {} is missing", words(one.group));
     if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
     text += fmt::format("; {}.", one.why_not);
     if (const catalogue::Entry* entry = catalogue::find(one.group.front().effect))
-      text += fmt::format(" What would tell: {}.", entry->info->separated_by);
+      text += fmt::format(" To decide, record: {}.", entry->info->separated_by);
     console.line(wrapped(text));
   }
 }
@@ -280,7 +279,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
   print_possible(console, d.possible);
-  if (!d.localised.empty()) console.line(wrapped(fmt::format("The error goes with {}.", shares(d.localised))));
+  if (!d.localised.empty()) console.line(wrapped(fmt::format("The error depends on {}.", shares(d.localised))));
   if (!d.delay_advice.empty()) console.line(wrapped(d.delay_advice));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
@@ -294,10 +293,10 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   }
   for (const selection::Trend& t : d.parameter_trends)
     console.line(
-        wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that goes with it.",
+        wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that depends on it.",
                             t.id, t.parameter, t.over)));
   if (!d.named.empty() && !d.remaining_structure.empty())
-    console.line(wrapped(fmt::format("With {}, the error still goes with {}.",
+    console.line(wrapped(fmt::format("With {}, the error still depends on {}.",
                                      d.between_records ? "friction that is each record's own" : "that added",
                                      shares(d.remaining_structure))));
   if (!d.disturbances.empty()) {

@@ -154,7 +154,7 @@ json resampling_json(const Diagnosis& d) {
   return {{"subsamples", d.resampling->subsamples},
           {"abstained", d.resampling->abstained},
           {"too_little", d.resampling->too_little},
-          {"whiteness", json_number(d.resampling->whiteness)},
+          {"whiteness", json_number(d.resampling->von_neumann_ratio)},
           {"lowest_hz", json_number(d.resampling->lowest_hz)},
           {"highest_hz", json_number(d.resampling->highest_hz)},
           {"lag_s", json_number(d.resampling->lag_s)},

@@ -53,9 +53,9 @@ void print_map(Console& console, const Evidence& map, const std::string& unit) {
 void print_confounding(Console& console, const Candidate& c, std::string_view separated_by) {
   for (const selection::ConfoundingReason& reason : c.confounding_reasons)
     console.line(wrapped(fmt::format(
-        "Not to be distinguished from {} here: only {:.2g} % of what it does in these data is its own{}.",
+        "Cannot be distinguished from {} here: only {:.2g} % of its torque in these data is orthogonal to it{}.",
         reason.effect, reason.own_percent,
-        reason.variable.empty() ? "" : fmt::format("; both go with {}", variable_in_words(reason.variable)))));
+        reason.variable.empty() ? "" : fmt::format("; both depend on {}", variable_in_words(reason.variable)))));
   if (!c.cannot_distinguish.empty() && !separated_by.empty())
     console.line(
         wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.", separated_by)));

@@ -139,7 +139,7 @@ std::string by_experiment(const estimation::Identification& found) {
 }
 
 std::string pooled(const estimation::Identification& found) {
-  Table table({"all together", "value", "95 % interval", "", "unit", "excited", ""}, "lrrrlrl");
+  Table table({"pooled", "value", "95 % interval", "", "unit", "excited", ""}, "lrrrlrl");
   for (const Estimate& e : found.estimates)
     table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
                e.excitation ? fmt::format("{:.3g} %", 100.0 * *e.excitation) : "",
@@ -192,7 +192,8 @@ std::string velocity_text(const estimation::PreparedData& prepared) {
   }
   if (both == 0) return {};
   if (fused == 0)
-    return "; the motor's velocity is the derivative of its position, as the measured one is not better or differs";
+    return "; the motor's velocity is the derivative of its position, as the measured one has no less noise or differs "
+           "from it";
   return fmt::format(
       "; the motor's velocity is the measured one above {:.3g} Hz, where it has less noise than the "
       "derivative of the position{}",

@@ -44,10 +44,10 @@ std::string learned_table_text(const std::string& id, const std::string& variabl
   const auto unseen = std::count(learned.visited.begin(), learned.visited.end(), std::uint8_t{0});
   const std::string unit = unit_of(variable, torque_unit);
   std::string text = wrapped(fmt::format(
-      "{}: {} points over {} from {} to {}, values from {} to {}, standard errors up to {}; as smooth as {:.1f} free "
-      "numbers.",
+      "{}: {} points over {} from {} to {}, values from {} to {}, standard errors up to {}; {:.1f} effective "
+      "degrees of freedom.",
       id, table.at.size(), variable, number(table.at.front()), with_unit(table.at.back(), unit), number(*low),
-      with_unit(*high, torque_unit), with_unit(error, torque_unit), learned.effective));
+      with_unit(*high, torque_unit), with_unit(error, torque_unit), learned.effective_degrees_of_freedom));
   text += "\n" +
           wrapped(fmt::format("On samples left out of its fit the squared error decreases by {:.1f} % (score {:.0f}).",
                               learned.decrease_percent, learned.score));

@@ -32,7 +32,7 @@ std::string resonance_text(const measurement::Resonance& r) {
 }
 
 std::string resonances_text(const measurement::ResonanceSearch& search) {
-  if (!search.why_not.empty()) return fmt::format("No word on resonances: {}.", search.why_not);
+  if (!search.why_not.empty()) return fmt::format("Resonances were not determined: {}.", search.why_not);
   const std::string unexplained =
       search.unexplained == 0
           ? ""

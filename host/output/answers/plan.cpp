@@ -8,6 +8,8 @@
 
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
+#include "host/physics/catalogue/constants.hpp"
+#include "shared/effects/effect.hpp"
 
 namespace flexspline::output {
 namespace {
@@ -30,10 +32,15 @@ std::string frequency_of(const Run& run) {
   return fmt::format("{:g} Hz", run.frequency_hz);
 }
 
-std::string amplitude_of(const Run& run) {
+// Of what a run's set point is in, on an axis that turns or moves straight.
+std::string_view unit_of(const Run& run, data::Axis axis) {
+  if (run.mode == Mode::current) return "A";
+  return catalogue::unit_on(run.mode == Mode::position ? effects::units::kAngle : effects::units::kVelocity, axis);
+}
+
+std::string amplitude_of(const Run& run, data::Axis axis) {
   if (run.mode == Mode::off) return "";
-  const char* unit = run.mode == Mode::current ? "A" : run.mode == Mode::velocity ? "rad/s" : "rad";
-  return fmt::format("{} {}", number(run.amplitude, 3), unit);
+  return fmt::format("{} {}", number(run.amplitude, 3), unit_of(run, axis));
 }
 
 std::string percent(const std::optional<double>& value) {
@@ -50,10 +57,12 @@ void print_runs(Console& console, const Design& design) {
     const std::string load = run.locked                  ? "locked"
                              : run.load_torque_nm != 0.0 ? fmt::format("{:+.3g} N m", run.load_torque_nm)
                                                          : "free";
-    table.row({run.name, motion_of(run), amplitude_of(run), frequency_of(run), fmt::format("{:g} s", run.duration_s),
-               load, fmt::format("{} A", number(peak.current_a, 3)),
-               fmt::format("{} rad/s", number(peak.velocity_rad_s, 3)),
-               fmt::format("{} rad", number(peak.travel_rad, 3))});
+    table.row(
+        {run.name, motion_of(run), amplitude_of(run, design.axis), frequency_of(run),
+         fmt::format("{:g} s", run.duration_s), load, fmt::format("{} A", number(peak.current_a, 3)),
+         fmt::format("{} {}", number(peak.velocity_rad_s, 3),
+                     catalogue::unit_on(effects::units::kVelocity, design.axis)),
+         fmt::format("{} {}", number(peak.travel_rad, 3), catalogue::unit_on(effects::units::kAngle, design.axis))});
   }
   console.line(table.text());
   std::vector<std::string> printed;
@@ -81,7 +90,7 @@ void print_plan(Console& console, const Design& design, const std::string& file)
     console.line(
         console.bold(fmt::format("To distinguish {} from {}", design.plan.separate[0], design.plan.separate[1])));
   else
-    console.line(console.bold("To show what is not well known"));
+    console.line(console.bold("To determine the parameters"));
   for (const std::string& note : design.plan.notes) console.line(wrapped(note));
   if (design.plan.runs.empty() && !useless)
     console.line(
@@ -91,7 +100,7 @@ void print_plan(Console& console, const Design& design, const std::string& file)
     print_runs(console, design);
   }
   if (!design.parameters.empty()) {
-    Table table({"parameter", "value", "", "error so far", "expected"}, "lrlrr");
+    Table table({"parameter", "value", "", "relative std now", "expected"}, "lrlrr");
     for (const planning::Precision& p : design.parameters)
       table.row({fmt::format("{}.{}", p.id, p.parameter), number(p.value), p.unit == "1" ? "" : p.unit,
                  percent(p.percent_before), percent(p.percent_after)});
@@ -112,9 +121,7 @@ json plan_json(const Design& design) {
                     {"mode", planning::name_of(run.mode)},
                     {"waveform", planning::name_of(run.waveform)},
                     {"amplitude", json_number(run.amplitude)},
-                    {"unit", run.mode == Mode::current    ? "A"
-                             : run.mode == Mode::position ? "rad"
-                                                          : "rad/s"},
+                    {"unit", unit_of(run, design.axis)},
                     {"offset", json_number(run.offset)},
                     {"frequency_hz", json_number(run.frequency_hz)},
                     {"end_frequency_hz", json_number(run.end_frequency_hz)},

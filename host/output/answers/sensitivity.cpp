@@ -35,7 +35,7 @@ json to_json(const Variant& v) {
   json overall = json::array(), experiments = json::array();
   for (const SignalError& s : v.overall) {
     json signal = common(s);
-    signal["most_in"] = s.most_in.empty() ? json(nullptr) : json(s.most_in);
+    signal["most_in"] = s.worst_experiment.empty() ? json(nullptr) : json(s.worst_experiment);
     overall.push_back(std::move(signal));
   }
   for (const ExperimentErrors& e : v.experiments) {

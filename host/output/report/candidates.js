@@ -24,7 +24,7 @@ function candidateCard(c, round) {
   if (c.check) card.append(el("p", {}, el("strong", {}, "Check on the machine: "), c.check));
   if (c.rivals.length) {
     card.append(el("p", {}, el("strong", {}, "Not to be distinguished from: "), listed(c.rivals, "or"), " in these data. ",
-      c.rival_reasons.map((r) => `Beside ${r.effect}, only ${number(r.own_percent, 2)} % of what it does is its own${r.variable ? `; both go with ${variableName(r.variable)}` : ""}.`).join(" ")));
+      c.rival_reasons.map((r) => `It cannot be distinguished from ${r.effect}: only ${number(r.own_percent, 2)} % of its torque is orthogonal to it${r.variable ? `; both depend on ${variableName(r.variable)}` : ""}.`).join(" ")));
     if (c.separating_experiment) card.append(el("p", {}, el("strong", {}, "What would distinguish them: "), c.separating_experiment, "."));
   }
   if (c.parameters.length)
@@ -50,7 +50,7 @@ function interval(p) { return p.interval[0] === null ? "–" : `${number(p.inter
 function candidateTable(list, named, caption) {
   const isNamed = (c) => named.some((n) => n.effect === c.effect && n.order === c.order);
   const verdict = (c) => (!c.admissible ? "refused: " + c.why_not : named.length && !isNamed(c) && c.score >= 20 ? "helps, but explains less than the best" : scoreInWords(c));
-  return table(caption, ["candidate", "balance", { n: "score" }, { n: "explains" }, { n: "error before" }, { n: "after" }, "unit", "would show from", "evidence"],
+  return table(caption, ["candidate", "balance", { n: "score" }, { n: "explains" }, { n: "error before" }, { n: "after" }, "unit", "smallest detectable", "evidence"],
     list.map((c) => [effectName(c), c.balance, { n: number(c.score, 3) }, { n: number(c.chi2_fall_percent, 3) + " %" }, { n: number(c.rmse_cv_before, 3) }, { n: number(c.rmse_cv_after, 3) }, unitText(c.unit),
       leastShown(c), verdict(c)]));
 }
@@ -63,7 +63,7 @@ function fillUnknown(s, c) {
   s.append(figure({
     title: `What no effect explains, over ${name}`, height: 240,
     label: `Torque over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error on data left out of the fit`,
-    caption: el("span", {}, el("strong", {}, `${number(c.chi2_fall_percent, 3)} %`), ` of the squared error on data left out of its fit goes with this curve${what ? ", " + what : ""}`),
+    caption: el("span", {}, el("strong", {}, `${number(c.chi2_fall_percent, 3)} %`), ` less squared error on data left out of its fit with this curve${what ? ", " + what : ""}`),
     key: [{ name: "learnt curve", colour: "residual" }, { name: "95 % of it", colour: "residual", kind: "band" }],
     make: (k, plot) => ({
       data: [at, end(1), end(0), value],
@@ -83,7 +83,7 @@ function fillUnknown(s, c) {
 function fillRound(s, round) {
   s.append(el("p", {}, round.verdict_in_words));
   const telling = round.localised.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`);
-  if (telling.length) s.append(el("p", {}, `Most of the error goes with ${listed(telling)}; shares overlap, as these quantities move together.`));
+  if (telling.length) s.append(el("p", {}, `Most of the error depends on ${listed(telling)}; shares overlap, as these quantities move together.`));
   if (round.delay_s !== null)
     s.append(el("p", { class: "note" }, round.delay_advice));
   const same = (a, b) => a.effect === b.effect && a.order === b.order;
@@ -98,9 +98,9 @@ function fillRound(s, round) {
       s.append(folded(`${round.candidates.length - 8} more candidates`, false, (body) => body.append(candidateTable(round.candidates.slice(8), round.named, "The others, best first"))));
   }
   for (const t of round.parameter_trends)
-    s.append(el("p", { class: "note" }, `${t.id}.${t.parameter} differs between experiments with ${t.over}: the model lacks something that goes with it.`));
+    s.append(el("p", { class: "note" }, `${t.id}.${t.parameter} differs between experiments with ${t.over}: the model lacks something that depends on it.`));
   if (round.named.length && round.remaining_structure.length)
-    s.append(el("p", {}, `With that added, the error still goes with ${listed(round.remaining_structure.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`))}.`));
+    s.append(el("p", {}, `With that added, the error still depends on ${listed(round.remaining_structure.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`))}.`));
   if (round.disturbances.length)
     s.append(table("Something from outside acted on the axis in these intervals; they were left out.", ["experiment", { n: "from" }, { n: "to" }, { n: "peak" }],
       round.disturbances.map((d) => [d.experiment, { n: withUnit(d.from_s, "s") }, { n: withUnit(d.to_s, "s") }, { n: withUnit(d.peak, d.unit) }])));

@@ -24,7 +24,7 @@ function part(title, introduction) {
   const happened = (r) => (r.fault ? r.fault.replaceAll("_", " ") : r.limit_cycle ? "limit cycle" : r.stops ? `${r.stops} stops` : "–");
   const body = part("Runs", "Errors are those of the true output position, after the first second.");
   body.append(table("Error against the set point, current, and what was predicted before the run (with its 95 % interval)",
-    ["compensation", { n: "rms error, mrad" }, { n: "peak, mrad" }, { n: "of none" }, { n: "predicted" }, { n: "rms current, A" }, { n: "peak, A" }, "what happened"],
+    ["compensation", { n: "rms error, mrad" }, { n: "peak, mrad" }, { n: "ratio to none" }, { n: "predicted" }, { n: "rms current, A" }, { n: "peak, A" }, "what happened"],
     report.runs.map((r) => [runName(r), { n: number(1e3 * r.rms_error_rad) }, { n: number(1e3 * r.peak_error_rad) }, { n: number(r.ratio_to_none, 3) },
       { n: interval(r.predicted) }, { n: number(r.rms_current_a, 3) }, { n: number(r.peak_current_a, 3) }, happened(r)])));
   if (report.no_prediction) body.append(el("p", { class: "note" }, `No prediction: ${report.no_prediction}`));

@@ -27,7 +27,7 @@ struct Subject {
   std::optional<model::Model> before{};  // without what was added
   estimation::PipelineOptions pipeline{};
   std::vector<blackbox::Specification> baselines{};  // black boxes to compare with `model`
-  comparison::Extent extent{};                       // of what is compared
+  comparison::CompareOptions extent{};               // of what is compared
   // Each only where the command has it.
   std::vector<estimation::Estimate> estimates{};  // of `model`
   std::vector<selection::Diagnosis> rounds{};     // the first of `before` where there is one

@@ -36,7 +36,7 @@ const signalBefore = (name, signal) => before?.experiments.find((e) => e.name ==
 
 const kNoiseSources = {
   periods: "by what differs from period to period", replicates: "by what differs between repeated records",
-  propagated: "stated noise and resolution, through the filters", stated: "as it was stated",
+  propagated: "stated noise and resolution, through the filters",
 };
 
 // ---- head ----
@@ -202,7 +202,7 @@ function mapFigure(signal, unit, m) {
   return figure({
     title, half: true, height: 190,
     label: `Mean error of the ${signalName(signal)} over ${name}; it explains ${number(share, 3)} % of the error's variance`,
-    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the error's variance goes with it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be distinguished from chance",
+    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the error's variance depends on it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be distinguished from chance",
     make: (k, plot) => ({
       data: [m.x, noise, noise.map((v) => (v === null ? null : -v)), up(m.plain, 2), up(m.plain, -2), up(m.with_direction, 2), up(m.with_direction, -2),
         m.plain.mean, m.with_direction.mean, ...(m.plain_before ? [m.plain_before.mean, m.with_direction_before.mean] : [])],
@@ -317,7 +317,7 @@ function frictionFigure(f, title, top) {
   if (hasMaps || report.loops.length || report.friction) {
     const s = section(before ? "Where did it fail, and what is left?" : "Where does it fail?",
       hasMaps ? "The error is averaged over all samples in which a quantity has about the same value. If it differs from zero somewhere by more than its bands, the model lacks " +
-        "something that goes with that quantity. What resists motion changes its sign with the direction: it shows in the error times the direction." : null);
+        "something that depends on that quantity. What resists motion changes its sign with the direction: it shows in the error times the direction." : null);
     if (hasMaps)
       s.append(el("ul", { class: "key", "aria-label": "Lines of the plots below" }, [
         { name: "mean error (measured less model)", colour: "residual" }, { name: "mean of error times direction", colour: "directed", dash: [6, 3] },
@@ -339,7 +339,7 @@ function frictionFigure(f, title, top) {
         into.append(grid);
       };
       if (shows.length) draw(shows, s);
-      else s.append(el("p", {}, "The error goes with none of the measured quantities by more than chance would have it."));
+      else s.append(el("p", {}, "The error depends on none of the measured quantities more than by chance."));
       if (rest.length)
         s.append(folded(shows.length ? `${rest.length} more quantities, with less or nothing to see` : `The maps of all ${rest.length} quantities`, false, (body) => draw(rest, body)));
     }

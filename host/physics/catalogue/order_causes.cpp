@@ -217,8 +217,9 @@ std::string order_hint(const Entry& effect, const model::Drive& drive) {
   if ((needed & kPolePairs) != 0 && !turn.pole_pairs) missing.emplace_back("pole_pairs");
   if ((needed & kSlots) != 0 && !turn.slots) missing.emplace_back("motor_slots");
   if (missing.empty()) return {};
-  return fmt::format("State {} of the motor in [drive] of the model: {} would tell whether the order is the motor's.",
-                     fmt::join(missing, " and "), missing.size() > 1 ? "they" : "it");
+  return fmt::format(
+      "State {} of the motor in [drive] of the model: from {} it can be decided whether the order is the motor's.",
+      fmt::join(missing, " and "), missing.size() > 1 ? "they" : "it");
 }
 
 std::vector<double> orders_of_motor(const Entry& effect, const model::Drive& drive) {

@@ -53,7 +53,7 @@ export class Missing {
     const shown = found.candidates.slice(0, 12);
     const list = el("div", { class: "column candidates" },
       el("p", { class: `verdict ${good ? "fine" : none ? "open" : "bad"}`, "data-verdict": found.verdict }, el("span", { class: "sign", "aria-hidden": "true" }, good ? "✓" : none ? "?" : "!"), sentence(found)),
-      found.possible?.length ? el("p", { class: "rivals", "data-possible": String(found.possible.length) }, el("strong", {}, "Cannot tell whether missing: "), found.possible.map((p) =>
+      found.possible?.length ? el("p", { class: "rivals", "data-possible": String(found.possible.length) }, el("strong", {}, "These data do not decide whether missing: "), found.possible.map((p) =>
         p.effects.map(inWords).join(" or ") + ` (${p.frequency === null ? "" : `chosen in ${num(100 * p.frequency, 2)} of 100 subsamples; `}${p.why_not})`).join("; "), ".") : null,
       unknown ? el("div", { class: "choice" }, button("Its shape", () => { this.chosen = ""; this.render(state); }, { "aria-pressed": chosen ? "false" : "true" })) : null,
       found.named.length > 1 ? el("p", { class: "rivals" }, el("strong", {}, "To distinguish them: "), found.candidates.find((c) => label(c) === first)?.separating_experiment ?? "flexspline plan --separate designs a motion", ".") : null,

@@ -11,9 +11,9 @@ namespace flexspline::estimation {
 // Those of role fit. Throws data::DataError where there is none.
 std::vector<const data::Experiment*> experiments_to_fit(const data::Dataset& dataset);
 
-// As form(), of these experiments alone.
-std::unique_ptr<Identification> form_on(const std::vector<const data::Experiment*>& fit_on,
-                                        const data::Dataset& dataset, const model::Model& model,
-                                        const PipelineOptions& options);
+// As build_balances(), of these experiments alone.
+std::unique_ptr<Identification> build_balances_from(const std::vector<const data::Experiment*>& fit_on,
+                                                    const data::Dataset& dataset, const model::Model& model,
+                                                    const PipelineOptions& options);
 
 }  // namespace flexspline::estimation

@@ -1,12 +1,12 @@
-// compare --beside: black boxes next to the model, as a user asks for them.
+// compare --baseline: black boxes next to the model, as a user asks for them.
 #include <gtest/gtest.h>
 
 #include "tests/cli/tool.hpp"
 
-namespace flexspline::cli_test::beside_test {
+namespace flexspline::cli_test::black_boxes_test {
 namespace {
 
-class Beside : public testing::Test {
+class BlackBoxes : public testing::Test {
  protected:
   // One recording and one fit for all tests of this file.
   static void SetUpTestSuite() {
@@ -20,11 +20,11 @@ class Beside : public testing::Test {
   }
   static Shell* shell_;
 };
-Shell* Beside::shell_ = nullptr;
+Shell* BlackBoxes::shell_ = nullptr;
 
-TEST_F(Beside, EachBlackBoxHasARowForEachSignalAndStandsFarAboveTheModel) {
+TEST_F(BlackBoxes, EachBlackBoxHasARowForEachSignalAndStandsFarAboveTheModel) {
   const nlohmann::json found =
-      shell_->json("flexspline compare --model fitted.toml demo-out --beside fir:20 --beside arx:4,4,1");
+      shell_->json("flexspline compare --model fitted.toml demo-out --baseline fir:20 --baseline arx:4,4,1");
   std::size_t firs = 0, arxs = 0;
   for (const nlohmann::json& b : found["beside"]) {
     expect_fields(b, {"asked",      "black_box",          "signal",        "unit",     "load",
@@ -44,18 +44,18 @@ TEST_F(Beside, EachBlackBoxHasARowForEachSignalAndStandsFarAboveTheModel) {
   EXPECT_EQ(found["beside"][0]["parameters"], 41);
 }
 
-TEST_F(Beside, TheTableNamesThemAfterTheModel) {
-  const std::string text = shell_->must("flexspline compare --model fitted.toml demo-out --beside arx:auto");
-  const auto heading = text.find("Beside the model");
+TEST_F(BlackBoxes, TheTableNamesThemAfterTheModel) {
+  const std::string text = shell_->must("flexspline compare --model fitted.toml demo-out --baseline arx:auto");
+  const auto heading = text.find("BlackBoxes the model");
   ASSERT_NE(heading, std::string::npos) << text;
   EXPECT_LT(text.find("all together"), heading);
   EXPECT_NE(text.find("arx:", heading), std::string::npos);
-  EXPECT_FALSE(contains(shell_->must("flexspline compare --model fitted.toml demo-out"), "Beside the model"));
+  EXPECT_FALSE(contains(shell_->must("flexspline compare --model fitted.toml demo-out"), "BlackBoxes the model"));
 }
 
-TEST_F(Beside, ThoseHeldOutAreNotFitted) {
+TEST_F(BlackBoxes, ThoseHeldOutAreNotFitted) {
   const std::string line =
-      "flexspline compare --model fitted.toml demo-out/free-sine-1hz.csv demo-out/free-trapezoid.csv --beside fir:3";
+      "flexspline compare --model fitted.toml demo-out/free-sine-1hz.csv demo-out/free-trapezoid.csv --baseline fir:3";
   const nlohmann::json both = shell_->json(line)["beside"][0];
   const nlohmann::json one = shell_->json(line + " --holdout demo-out/free-trapezoid.csv")["beside"][0];
   EXPECT_TRUE(both["rmse_holdout"].is_null());
@@ -67,16 +67,16 @@ TEST_F(Beside, ThoseHeldOutAreNotFitted) {
   EXPECT_LT(one["rmse_fit"].get<double>(), both["experiments"][0]["rmse"].get<double>());
 }
 
-TEST_F(Beside, AWrongSpecificationIsQuotedBeforeAnythingIsRead) {
+TEST_F(BlackBoxes, AWrongSpecificationIsQuotedBeforeAnythingIsRead) {
   for (const char* text : {"arma:2,2", "fir:0", "fir:many", "arx:4", "arx:4,4,0", "fir"}) {
     const Answer answer =
-        shell_->run(std::string("flexspline compare --model nowhere.toml nowhere.csv --beside ") + text);
+        shell_->run(std::string("flexspline compare --model nowhere.toml nowhere.csv --baseline ") + text);
     EXPECT_EQ(answer.code, 2) << text;
     EXPECT_TRUE(answer.out.empty()) << answer.out;
-    EXPECT_TRUE(contains(answer.err, std::string("flexspline compare: --beside ") + text)) << answer.err;
+    EXPECT_TRUE(contains(answer.err, std::string("flexspline compare: --baseline ") + text)) << answer.err;
     EXPECT_TRUE(contains(answer.err, "arx:4,4,1")) << answer.err;
   }
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test::beside_test
+}  // namespace flexspline::cli_test::black_boxes_test
