@@ -13,6 +13,7 @@
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/record_laws.hpp"
 #include "host/engine/selection/wald_test.hpp"
+#include "host/engine/selection/within_records.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -69,21 +70,62 @@ std::vector<Scaling> scalings(const estimation::Identification& base, const Regr
   return all;
 }
 
+// Whether the effect, at its value on all data, explains more within records too, where each has parameters of its own:
+// significantly in all of them together, for all `tried` effects, and in none significantly less.
+bool is_shown_within_records(const estimation::Identification& base, const RegressionProblem& data,
+                             const CandidateFit& candidate, std::size_t tried) {
+  // The model's own parameters alone are free.
+  const std::vector<estimation::ParameterRef> refs = estimation::free_linear_parameters(
+      base.terms, estimation::terms_on(base.terms, data.balance(), data.prepared().output_signals));
+  estimation::Terms extended = base.terms;
+  extended.push_back(candidate.fit.terms.back());
+  const WithinRecords within = compare_within_records(data.target(), data.columns(base.terms, refs),
+                                                      data.columns(extended, refs), data.records());
+  const double p_value = numbers::chi_squared_above(1.0, std::max(0.0, within.deviance));
+  return static_cast<double>(tried) * p_value <= kPolicy.scaling_p_value &&
+         within.least > -numbers::chi_squared_quantile(1.0, 0.95);
+}
+
 // By chance, in one of the effects that were tried.
 double p_value_of_all(const Scaling& one, const std::vector<Scaling>& all) {
   return std::min(1.0, static_cast<double>(all.size()) * one.p_value);
 }
 
-void list_as_possible(const NamedEffect& name, std::size_t records, double p_value, Diagnosis& result) {
+void list_as_possible(const NamedEffect& name, const std::string& why, Diagnosis& result) {
   std::erase_if(result.possible, [&](const PossibleEffect& p) {
     return std::any_of(p.group.begin(), p.group.end(), [&](const NamedEffect& n) { return n.effect == name.effect; });
   });
-  result.possible.push_back(
-      {{name},
-       fmt::format("it shows between records only, and friction of {} records depends on it by chance with p = {:.2g}",
-                   records, p_value),
-       std::nullopt,
-       std::nullopt});
+  result.possible.push_back({{name}, why, std::nullopt, std::nullopt});
+}
+
+std::string chance_between_records(std::size_t records, double p_value) {
+  return fmt::format(
+      "it shows between records only, and friction of {} records depends on it by chance with p = {:.2g}", records,
+      p_value);
+}
+
+// Lists the effect that explains most of what differs between two or three records, where it is most of it: a line
+// through so few has no freedom left, or little.
+void list_of_few_records(const estimation::Identification& base, const RegressionProblem& data,
+                         const std::vector<CandidateFit>& candidates, Diagnosis& result) {
+  const RecordFriction own = friction_by_record(base, data, 2);
+  if (own.parameters.empty() || own.records.size() >= kPolicy.fewest_of_scaling) return;
+  const std::vector<Scaling> all = scalings(base, data, candidates, own);
+  const auto best = std::max_element(all.begin(), all.end(), [](const Scaling& a, const Scaling& b) {
+    return a.fit.explained_share < b.fit.explained_share;
+  });
+  if (best == all.end() || best->fit.explained_share < kPolicy.most_share) return;
+  const catalogue::Entry& entry = *best->candidate->model.entry;
+  if (best->fit.coefficient * entry.parameters.front().usual <= 0.0) return;
+  const NamedEffect name{std::string(entry.name()), std::nullopt};
+  if (std::any_of(result.named.begin(), result.named.end(),
+                  [&](const NamedEffect& n) { return n.effect == name.effect; }))
+    return;
+  list_as_possible(
+      name,
+      fmt::format("it explains {:.0f} % of how the friction of {} records differs, and {} records are needed",
+                  100.0 * best->fit.explained_share, own.records.size(), kPolicy.fewest_of_scaling),
+      result);
 }
 
 // The candidate's value is that of the records' friction.
@@ -154,7 +196,10 @@ std::unique_ptr<AllRecords> fit_all_records(const SearchedBalance& motor, const 
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
   const RegressionProblem& data = motor_balance_of(base);
   const RecordFriction own = friction_by_record(base, data, kPolicy.fewest_of_scaling);
-  if (own.parameters.empty()) return false;
+  if (own.parameters.empty()) {
+    list_of_few_records(base, data, motor.candidates, result);
+    return false;
+  }
   const std::vector<Scaling> all = scalings(base, data, motor.candidates, own);
   const auto best = std::min_element(all.begin(), all.end(),
                                      [](const Scaling& a, const Scaling& b) { return a.p_value < b.p_value; });
@@ -170,7 +215,7 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   if (at == result.candidates.end()) return false;
   const std::size_t records = own.records.size();
   if (p_value > kPolicy.scaling_p_value) {
-    list_as_possible(name, records, p_value, result);
+    list_as_possible(name, chance_between_records(records, p_value), result);
     return false;
   }
   take_value(*best, records, p_value, *at);
@@ -205,11 +250,11 @@ void take_back_unconfirmed_scaling(const estimation::Identification& base, const
   for (const NamedEffect& n : result.named) {
     const auto at = std::find_if(all.begin(), all.end(),
                                  [&](const Scaling& s) { return s.candidate->model.entry->name() == n.effect; });
-    if (!is_scaled(n) || at == all.end() ||
+    if (!is_scaled(n) || at == all.end() || is_shown_within_records(base, data, *at->candidate, all.size()) ||
         is_shown_between_records(own.records.size(), p_value_of_all(*at, all), is_confirmed_by_held_out(result, n)))
       kept.push_back(n);
     else
-      list_as_possible(n, own.records.size(), p_value_of_all(*at, all), result);
+      list_as_possible(n, chance_between_records(own.records.size(), p_value_of_all(*at, all)), result);
   }
   result.named = std::move(kept);
 }
