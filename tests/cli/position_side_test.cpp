@@ -102,6 +102,37 @@ TEST(PositionSide, IsFoundByTheSpeedWhereThatIsOfTheOtherSide) {
   EXPECT_TRUE(contains(said, "state the size of 1 % as its unit")) << said;
 }
 
+TEST(PositionSide, ATorqueInPerMilleNeedsTheSizeOfOne) {
+  const Shell shell;
+  shell.write("log.csv", joint_log("time,motor_pos,motor_vel,Torque_actual_permille", 1.0));
+  const std::string said = shell.must("flexspline new --from log.csv --out project --gear-ratio 100");
+  EXPECT_TRUE(contains(said, "state the size of 1 per mille as its unit")) << said;
+}
+
+TEST(PositionSide, OfAJointWithATorqueSensorNextToTheMotorsIsTheOutput) {
+  const Shell shell;
+  const auto log_of = [](const std::string& header) {
+    std::string log = header + "\n";
+    for (int k = 0; k < 2000; ++k) {
+      const double t = 0.001 * k;
+      char text[200];
+      std::snprintf(text, sizeof text, "%.3f,%.9g,%.9g,%.9g,%.9g\n", t, kRatio * std::sin(6.0 * t), std::sin(6.0 * t),
+                    std::cos(6.0 * t), std::cos(6.0 * t));
+      log += text;
+    }
+    return log;
+  };
+  shell.write("log.csv", log_of("time,motor_pos_rad,ankle_pos_rad,current_A,ankle_torque_Nm"));
+  shell.run("flexspline new --from log.csv --out project --gear-ratio 100");
+  const std::string toml = shell.file("project/dataset.toml");
+  EXPECT_TRUE(contains(toml, "[columns.output_position_rad]")) << toml;
+  EXPECT_TRUE(contains(toml, "source = \"ankle_pos_rad\"")) << toml;
+  // Not without that sensor: then nothing says what the second position is.
+  shell.write("log.csv", log_of("time,motor_pos_rad,ankle_pos_rad,current_A,value"));
+  shell.run("flexspline new --from log.csv --out other --gear-ratio 100");
+  EXPECT_FALSE(contains(shell.file("other/dataset.toml"), "[columns.output_position_rad]"));
+}
+
 TEST(PositionSide, IsAskedForWhereNamesDoNotSayAndTheRatioMakesADifference) {
   const Shell shell;
   shell.write("log.csv", joint_log("time,pos,vel,iq"));

@@ -49,7 +49,7 @@ TEST(UnfinishedProject, ADraftThatWasChangedByHandIsNotWrittenOver) {
   const std::string line =
       "flexspline new --from log.csv --out project --map time_s=clock --map motor_position_rad=kappa";
   const Answer answer = shell.run(line);
-  EXPECT_EQ(answer.code, 1);
+  EXPECT_EQ(answer.code, 2);
   EXPECT_TRUE(contains(answer.err, "project/dataset.toml")) << answer.err;
   EXPECT_TRUE(contains(answer.err, "--force")) << answer.err;
   EXPECT_EQ(shell.file("project/dataset.toml"), changed);

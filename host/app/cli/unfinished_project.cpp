@@ -132,10 +132,10 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   for (const data::Finding& error : errors) console.error(error.text());
   if (errors.empty()) console.error(why.what());
   std::string line = as_given(request) + missing_maps(draft) + missing_counts(errors) + tolerations(errors);
-  if (!draft.open_question.empty()) line += " --position-side link";
+  if (!draft.open_question.empty()) line += " --position-side SIDE";
   console.error(
-      fmt::format("{} holds what could be found; replace NAME, NUMBER or a wrong name by the right one "
-                  "(NAME:UNIT states its unit), and continue with\n  {}",
+      fmt::format("{} holds what could be found; replace NAME, NUMBER, SIDE or a wrong name by the right "
+                  "one (NAME:UNIT states its unit), and continue with\n  {}",
                   file.string(), line));
 }
 

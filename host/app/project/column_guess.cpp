@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <numbers>
 #include <set>
@@ -38,9 +39,15 @@ std::string ours_for(const ColumnReading& r, bool other_effort) {
   return {};
 }
 
-bool is_in_percent(std::string_view name) {
-  return name.find("[%]") != std::string_view::npos || name.find("(%)") != std::string_view::npos ||
-         name.ends_with("_percent") || name.ends_with("_pct");
+// What a name says its numbers are parts of: "1 %", or "1 per mille" (CiA 402 has torques and currents so); empty:
+// none.
+std::string_view ratio_in(std::string_view name) {
+  const auto has = [&](std::initializer_list<std::string_view> any) {
+    return std::any_of(any.begin(), any.end(), [&](std::string_view part) { return name.find(part) != name.npos; });
+  };
+  if (has({"[%]", "(%)", "_percent", "_pct"})) return "1 %";
+  if (has({"permille", "per_mille", "Permille", "PerMille", "promille", "Promille"})) return "1 per mille";
+  return {};
 }
 
 std::string reason(const std::string& theirs, const ColumnReading& r) {
@@ -53,10 +60,11 @@ std::string reason(const std::string& theirs, const ColumnReading& r) {
                                                          : "");
   if (r.by_unit_only) text += ", by its unit alone";
   if (!r.unit.empty()) return text;
-  if (is_in_percent(theirs))
-    return text +
-           "; in percent of what is not known, taken as SI: state the size of 1 % as its unit, as in --map "
-           "motor_torque_nm=NAME:\"0.125 N*m\" where 12.5 N*m are 100 %";
+  if (const std::string_view one = ratio_in(theirs); !one.empty())
+    return text + fmt::format(
+                      "; a ratio to a rated value that the file does not have, taken as SI: state the size of {} "
+                      "as its unit, as in --map motor_torque_nm={}:\"0.125 N*m\" where 12.5 N*m are {}",
+                      one, theirs, one == "1 %" ? "100 %" : "100 per mille");
   return text + "; no unit in its name, taken as SI";
 }
 
@@ -94,6 +102,8 @@ class Guesser {
     for (const bool by_unit_only : {false, true})
       for (const std::string& name : by_preference)
         if (is_free(name)) take(name, by_unit_only, current);
+    for (const std::string& name : names_)
+      if (is_free(name)) take_beside_sensor(name);
     for (const std::string& name : names_)
       if ((is_free(name) || (is_left_out(name) && !is_source(name))) && !name.empty()) result_.unused.push_back(name);
     find_axis();
@@ -142,6 +152,26 @@ class Guesser {
     const double scale = r.electrical ? 1.0 / options_.pole_pairs.value_or(1) : 1.0;
     if (r.electrical && !options_.pole_pairs) result_.needs_pole_pairs = name;
     result_.columns.push_back({ours, name, r.unit, reason(name, r), scale});
+  }
+
+  // A position or velocity whose name says no side, beside one that says that it is the motor's, is of the output where
+  // its first word is that of the torque sensor: "ankle_pos" with "motor_pos" and "ankle_torque".
+  void take_beside_sensor(const std::string& name) {
+    const ColumnReading& r = readings_[name];
+    if ((r.kind != Kind::position && r.kind != Kind::velocity) || r.side != Side::open || r.set_point) return;
+    const auto first_word = [](const std::string& text) { return text.substr(0, text.find_first_of("_. ")); };
+    const auto is_of = [&](std::string_view ours, auto&& fits) {
+      return std::any_of(result_.columns.begin(), result_.columns.end(),
+                         [&](const ColumnGuess& c) { return c.ours == ours && fits(c); });
+    };
+    const auto says_motor = [&](const ColumnGuess& c) { return readings_[c.theirs].side == Side::motor; };
+    const auto is_same_part = [&](const ColumnGuess& c) { return first_word(c.theirs) == first_word(name); };
+    if (!is_of("torque_nm", is_same_part)) return;
+    if (!is_of("motor_position_rad", says_motor) && !is_of("motor_velocity_rad_s", says_motor)) return;
+    ColumnReading of_output = r;
+    of_output.side = Side::link;
+    const std::string ours = ours_for(of_output, true);
+    if (!is_there(ours)) result_.columns.push_back({ours, name, r.unit, reason(name, of_output), 1.0});
   }
 
   void find_axis() {

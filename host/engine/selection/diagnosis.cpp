@@ -283,11 +283,13 @@ std::string delay_advice(double delay_s, const estimation::PreparedData& prepare
   });
   const std::string what = fmt::format("The effort {} the motion by {:.3g} ms ({:.2g} samples)",
                                        delay_s > 0.0 ? "lags" : "leads", 1e3 * std::abs(delay_s), samples);
-  if (samples < kMoreThanHold && is_held)
+  if (delay_s > 0.0 && samples < kMoreThanHold && is_held)
     return what +
            ": it was moved by half a sample, as if the drive held it from sample to sample. If yours does not, state "
            "current_hold = \"none\" in dataset.toml.";
-  return what + " beyond the alignment: check the time stamps, or current_hold in dataset.toml.";
+  return what + (delay_s > 0.0 ? " beyond the alignment: check the time stamps and filters of the log."
+                               : " beyond the alignment: it acts later than it is logged, as a commanded current does "
+                                 "(current_delay), or the time stamps differ.");
 }
 
 void add_drifts(const SearchedBalance& balance, const CrossValidatedFit& fit, Diagnosis& result) {

@@ -58,6 +58,8 @@ void StabilitySelection::evaluate() {
 }
 
 std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::string>& names) const {
+  // The phase of a torque that was replaced by the load's model is the model's.
+  if (tables_.torque_has_noise) return std::nullopt;
   // At the setting of the highest bandwidth of the motion, reversals kept.
   const auto at = std::find_if(tables_.settings.begin(), tables_.settings.end(), [&](const auto& s) {
     return s.first <= 1.01 * tables_.bandwidth.highest_hz && !s.second;
