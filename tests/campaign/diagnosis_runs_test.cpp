@@ -120,9 +120,10 @@ TEST(Needless, IsTheEffectThatTheDataDoNotShow) {
   const data::Dataset dataset = runs(0.0, 6, asymmetry);
   const model::Model model =
       model_of({"inertia", "viscous_friction", "coulomb_friction", "viscous_asymmetry", "coulomb_asymmetry"});
-  EXPECT_EQ(needless(dataset, model, {"viscous_asymmetry", "coulomb_asymmetry"}, options()), "coulomb_asymmetry");
-  EXPECT_EQ(needless(dataset, model, {"viscous_asymmetry"}, options()), "");
-  EXPECT_EQ(needless(dataset, model, {}, options()), "");
+  EXPECT_EQ(least_significant_effect(dataset, model, {"viscous_asymmetry", "coulomb_asymmetry"}, options()),
+            "coulomb_asymmetry");
+  EXPECT_EQ(least_significant_effect(dataset, model, {"viscous_asymmetry"}, options()), "");
+  EXPECT_EQ(least_significant_effect(dataset, model, {}, options()), "");
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ TEST(PermutationTest, AgreesWithAllPermutationsOfSixRecords) {
   double mean = 0.0;
   constexpr int kSeeds = 40;
   for (unsigned seed = 0; seed < kSeeds; ++seed)
-    mean += permutation_p_value(exact(r.theta), {r.added}, {whole_of(exact(r.theta))}, 20000, seed) / kSeeds;
+    mean += permutation_p_value(exact(r.theta), {r.added}, {every_record(exact(r.theta))}, 20000, seed) / kSeeds;
   EXPECT_NEAR(mean, of_all, 4.0 * of_all / std::sqrt(20.0 * kSeeds) + of_all / 20.0);
 }
 
@@ -48,9 +48,10 @@ TEST(PermutationTest, FindsALawAndSeldomOneThatIsNotThere) {
   int found = 0, wrong = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     const RecordsWithLaw with(20, 0.8, seed), without(20, 0.0, 1000 + seed);
-    found += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 1000, seed) <= 0.01;
-    wrong += permutation_p_value(exact(without.theta), {without.added}, {whole_of(exact(without.theta))}, 1000, seed) <=
-             0.05;
+    found +=
+        permutation_p_value(exact(with.theta), {with.added}, {every_record(exact(with.theta))}, 1000, seed) <= 0.01;
+    wrong += permutation_p_value(exact(without.theta), {without.added}, {every_record(exact(without.theta))}, 1000,
+                                 seed) <= 0.05;
   }
   EXPECT_GT(found, 90);
   EXPECT_LT(wrong, 11);  // 5 are expected; 11 and more in one of 90 runs
@@ -65,7 +66,7 @@ TEST(PermutationTest, CountsHowManyLawsAreTried) {
     std::normal_distribution<double> normal;
     std::vector<MatrixXd> laws;
     for (int k = 0; k < 20; ++k) laws.push_back(MatrixXd::NullaryExpr(12, 2, [&] { return normal(random); }));
-    significant += permutation_p_value(exact(r.theta), laws, {whole_of(exact(r.theta))}, 400, seed) <= 0.1;
+    significant += permutation_p_value(exact(r.theta), laws, {every_record(exact(r.theta))}, 400, seed) <= 0.1;
   }
   EXPECT_LT(significant, 10);  // 4 are expected
 }
@@ -78,13 +79,14 @@ TEST(PermutationTest, FindsALawThatHoldsForTheFasterRecordsOnly) {
     // The slow half has the friction of the fastest, which the law contradicts.
     with.theta.topRows(16) = without.theta.topRows(16);
     with.theta.topRows(16).rowwise() += 1.5 * with.added.row(39);
-    std::vector<Part> parts;
+    std::vector<RecordSubset> parts;
     for (Index first = 0; first < 34; first += 4) {
       parts.push_back({{}, {0, 1}});
       for (Index i = first; i < 40; ++i) parts.back().records.push_back(i);
     }
     found += permutation_p_value(exact(with.theta), {with.added}, parts, 400, seed) <= 0.05;
-    of_all += permutation_p_value(exact(with.theta), {with.added}, {whole_of(exact(with.theta))}, 400, seed) <= 0.05;
+    of_all +=
+        permutation_p_value(exact(with.theta), {with.added}, {every_record(exact(with.theta))}, 400, seed) <= 0.05;
     wrong += permutation_p_value(exact(without.theta), {without.added}, parts, 400, seed) <= 0.05;
   }
   EXPECT_GT(found, 25);
