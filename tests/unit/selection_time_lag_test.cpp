@@ -54,7 +54,7 @@ RegressorTable sines(double lag_s, double noise, unsigned seed) {
 
 TEST(TimeLag, IsTheOneThatWasPutInWithinItsStandardError) {
   for (const double lag_s : {-9e-3, -1e-3, 0.0, 2.5e-3, 7e-3}) {
-    const auto lag = estimate_time_lag(sines(lag_s, 0.1, 1), {0}, Direction::sign, LagRange::longest, {});
+    const auto lag = estimate_time_lag(sines(lag_s, 0.1, 1), {0}, LagRange::longest, {});
     ASSERT_TRUE(lag) << lag_s;
     EXPECT_NEAR(lag->lag_s, lag_s, 4.0 * lag->std_s + 2e-5) << lag_s;
   }
@@ -64,7 +64,7 @@ TEST(TimeLag, StandardErrorIsThatOverManyNoises) {
   double sum = 0.0, squares = 0.0, stated = 0.0;
   constexpr unsigned kRuns = 60;
   for (unsigned seed = 0; seed < kRuns; ++seed) {
-    const auto lag = estimate_time_lag(sines(3e-3, 0.3, 100 + seed), {0}, Direction::sign, LagRange::longest, {});
+    const auto lag = estimate_time_lag(sines(3e-3, 0.3, 100 + seed), {0}, LagRange::longest, {});
     ASSERT_TRUE(lag);
     sum += lag->lag_s;
     squares += lag->lag_s * lag->lag_s;
@@ -77,11 +77,11 @@ TEST(TimeLag, StandardErrorIsThatOverManyNoises) {
 
 TEST(TimeLag, TakenOffItLeavesNone) {
   RegressorTable table = sines(6e-3, 0.02, 2);
-  const auto before = estimate_time_lag(table, {0}, Direction::sign, LagRange::longest, {});
+  const auto before = estimate_time_lag(table, {0}, LagRange::longest, {});
   ASSERT_TRUE(before);
   EXPECT_GT(before->reduction_share, 0.9);
   correct_time_lag(table, before->lag_s);
-  const auto after = estimate_time_lag(table, {0}, Direction::sign, LagRange::longest, {});
+  const auto after = estimate_time_lag(table, {0}, LagRange::longest, {});
   ASSERT_TRUE(after);
   EXPECT_NEAR(after->lag_s, 0.0, 1e-4);
 }
@@ -89,15 +89,15 @@ TEST(TimeLag, TakenOffItLeavesNone) {
 // Four rows are 16 ms.
 TEST(TimeLag, LongerThanUsualIsFoundUpToTheLongestOfAnAmplifier) {
   for (const double lag_s : {-22e-3, 21e-3}) {
-    const auto lag = estimate_time_lag(sines(lag_s, 0.1, 4), {0}, Direction::sign, LagRange::longest, {});
+    const auto lag = estimate_time_lag(sines(lag_s, 0.1, 4), {0}, LagRange::longest, {});
     ASSERT_TRUE(lag) << lag_s;
     EXPECT_NEAR(lag->lag_s, lag_s, 4.0 * lag->std_s + 1e-4) << lag_s;
-    EXPECT_FALSE(estimate_time_lag(sines(lag_s, 0.1, 4), {0}, Direction::sign, LagRange::usual, {}));
+    EXPECT_FALSE(estimate_time_lag(sines(lag_s, 0.1, 4), {0}, LagRange::usual, {}));
   }
 }
 
 TEST(TimeLag, BeyondTheSearchedRangeIsNotStated) {
-  EXPECT_FALSE(estimate_time_lag(sines(30e-3, 0.1, 3), {0}, Direction::sign, LagRange::longest, {}));
+  EXPECT_FALSE(estimate_time_lag(sines(30e-3, 0.1, 3), {0}, LagRange::longest, {}));
 }
 
 }  // namespace

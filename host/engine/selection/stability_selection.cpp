@@ -71,14 +71,13 @@ std::optional<TimeLag> StabilitySelection::time_lag(const std::vector<std::strin
   for (const std::string& name : names)
     for (const int term : terms_of(setting, {name}))
       terms.push_back(term == kPreslidingTerm ? term : setting.terms[static_cast<std::size_t>(term)]);
-  const bool presliding = std::erase(terms, kPreslidingTerm) > 0 && tables_.table.presliding;
+  std::erase(terms, kPreslidingTerm);
   // Half a period later a wave is the same wave again.
   const bool has_wave = std::any_of(terms.begin(), terms.end(), [&](int term) {
     return tables_.table.terms[static_cast<std::size_t>(term)].order.has_value();
   });
   const std::optional<TimeLag> lag =
-      estimate_time_lag(tables_.table, terms, presliding ? Direction::presliding : Direction::sign,
-                        has_wave ? LagRange::usual : LagRange::longest, policy_);
+      estimate_time_lag(tables_.table, terms, has_wave ? LagRange::usual : LagRange::longest, policy_);
   if (!lag || std::abs(lag->lag_s) < policy_.delay_errors * lag->std_s || lag->reduction_share < policy_.line_share)
     return std::nullopt;
   return lag;

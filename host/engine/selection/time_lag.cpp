@@ -28,8 +28,7 @@ Eigen::VectorXd shifted(const Eigen::VectorXd& now, const std::vector<Run>& runs
 }
 
 // The table with the model's columns, those of some terms and the target at each lag, in this order.
-RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& terms, Direction direction,
-                         const std::vector<double>& lags) {
+RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& terms, const std::vector<double>& lags) {
   RegressorTable small;
   static_cast<TableSamples&>(small) = table;
   static_cast<TableModel&>(small) = table;
@@ -40,16 +39,8 @@ RegressorTable with_lags(const RegressorTable& table, const std::vector<int>& te
   const auto columns = static_cast<Eigen::Index>(own.size());
   small.columns.resize(table.columns.rows(), columns + static_cast<Eigen::Index>(lags.size()));
   small.columns.leftCols(columns) = table.columns(Eigen::all, own);
-  const bool presliding = direction == Direction::presliding;
-  if (presliding)
-    for (std::size_t i = 0; i < table.presliding->instead_of.size(); ++i) {
-      const auto at = std::find(own.begin(), own.end(), table.presliding->instead_of[i]);
-      if (at != own.end())
-        small.columns.col(at - own.begin()) = table.presliding->columns.col(static_cast<Eigen::Index>(i));
-    }
   for (std::size_t i = 0; i < lags.size(); ++i)
-    small.columns.col(columns + static_cast<Eigen::Index>(i)) =
-        shifted(presliding ? table.presliding->target : table.target, table.runs, lags[i]);
+    small.columns.col(columns + static_cast<Eigen::Index>(i)) = shifted(table.target, table.runs, lags[i]);
   return small;
 }
 
@@ -61,13 +52,14 @@ struct LagWithin {
 
 // The best of all lags of up to so many rows.
 LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& table, const std::vector<int>& terms,
-                          Direction direction, const SelectionPolicy& policy) {
+                          const SelectionPolicy& policy) {
   std::vector<double> lags;
   // Whole rows alone, as interpolation between them would take off noise.
   for (int k = -most_rows; k <= most_rows; ++k) lags.push_back(row_s * k);
-  const RegressorTable small = with_lags(table, terms, direction, lags);
+  const RegressorTable small = with_lags(table, terms, lags);
   const ChosenColumns all = all_columns(small);
-  const Setting setting = make_setting(filtered_table(small, all, table.highest_law_hz), all, false, false, policy);
+  // Away from reversals: around them presliding, and any error of a friction law, is a phase itself.
+  const Setting setting = make_setting(filtered_table(small, all, table.highest_law_hz), all, true, false, policy);
   const auto tried = static_cast<Eigen::Index>(lags.size());
   const Eigen::Index columns = small.columns.cols() - tried;
   if (static_cast<double>(setting.rows.rows()) < policy.fewest_rows_per_column * static_cast<double>(columns))
@@ -104,13 +96,13 @@ LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& tab
 
 }  // namespace
 
-std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         Direction direction, LagRange range, const SelectionPolicy& policy) {
+std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms, LagRange range,
+                                         const SelectionPolicy& policy) {
   double row_s = 0.0;
   for (const Run& run : table.runs) row_s = std::max(row_s, run.row_s);
   int most_rows = policy.usual_lag_rows;
   while (true) {
-    const LagWithin best = best_lag_within(most_rows, row_s, table, terms, direction, policy);
+    const LagWithin best = best_lag_within(most_rows, row_s, table, terms, policy);
     if (best.found == Found::inside) return best.lag;
     const int longest = static_cast<int>(std::ceil(policy.longest_lag_s / row_s));
     if (best.found == Found::nothing || range == LagRange::usual || most_rows >= longest) return std::nullopt;

@@ -18,11 +18,11 @@ struct TimeLag {
 enum class LagRange { usual, longest };
 
 // By least squares over all lags of up to policy.usual_lag_rows (profile likelihood), with the model's columns and
-// those of `terms` (places in table.terms), at the highest bandwidth of the motion; where the best one is at the end
-// and `range` is the longest, up to policy.longest_lag_s. Nothing where the data have too few samples or the best lag
-// is at the end of the range.
-std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms,
-                                         Direction direction, LagRange range, const SelectionPolicy& policy);
+// those of `terms` (places in table.terms), at the highest bandwidth of the motion and away from reversals; where the
+// best one is at the end and `range` is the longest, up to policy.longest_lag_s. Nothing where the data have too few
+// samples or the best lag is at the end of the range.
+std::optional<TimeLag> estimate_time_lag(const RegressorTable& table, const std::vector<int>& terms, LagRange range,
+                                         const SelectionPolicy& policy);
 
 // Shifts the target by a lag.
 void correct_time_lag(RegressorTable& table, double lag_s);
