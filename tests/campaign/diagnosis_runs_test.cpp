@@ -116,7 +116,7 @@ TEST(Complete, DoesNotAddWhatTakesOffAThousandthOfTheFirstFall) {
   EXPECT_EQ(next.named[0].effect, "torque_ripple");
 }
 
-TEST(Needless, IsTheEffectThatTheDataDoNotShow) {
+TEST(LeastSignificantEffect, IsTheEffectThatTheDataDoNotShow) {
   const data::Dataset dataset = runs(0.0, 6, asymmetry);
   const model::Model model =
       model_of({"inertia", "viscous_friction", "coulomb_friction", "viscous_asymmetry", "coulomb_asymmetry"});

@@ -1,26 +1,12 @@
 // compare --baseline: black boxes next to the model, as a user asks for them.
 #include <gtest/gtest.h>
 
-#include "tests/cli/tool.hpp"
+#include "tests/cli/fitted_demo.hpp"
 
 namespace flexspline::cli_test::black_boxes_test {
 namespace {
 
-class BlackBoxes : public testing::Test {
- protected:
-  // One recording and one fit for all tests of this file.
-  static void SetUpTestSuite() {
-    shell_ = new Shell;
-    shell_->record();
-    shell_->must("flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml");
-  }
-  static void TearDownTestSuite() {
-    delete shell_;
-    shell_ = nullptr;
-  }
-  static Shell* shell_;
-};
-Shell* BlackBoxes::shell_ = nullptr;
+class BlackBoxes : public FittedDemo {};
 
 TEST_F(BlackBoxes, EachBlackBoxHasARowForEachSignalAndStandsFarAboveTheModel) {
   const nlohmann::json found =

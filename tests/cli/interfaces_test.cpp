@@ -43,7 +43,7 @@ std::set<std::string> options_in_help(const std::string& help) {
   return options;
 }
 
-TEST(StepwiseSelection, BashCompletesCommandsOptionsChoicesAndEffects) {
+TEST(Completion, BashCompletesCommandsOptionsChoicesAndEffects) {
   const Shell shell;
   shell.must("flexspline completion bash >flexspline.bash");
   EXPECT_EQ(offered(shell, "flexspline ident"), std::set<std::string>{"identify"});
@@ -56,7 +56,7 @@ TEST(StepwiseSelection, BashCompletesCommandsOptionsChoicesAndEffects) {
   EXPECT_EQ(offered(shell, "flexspline identify --model my"), std::set<std::string>{"my model.toml"});
 }
 
-TEST(StepwiseSelection, OffersTheOptionsThatHelpListsAndNoOther) {
+TEST(Completion, OffersTheOptionsThatHelpListsAndNoOther) {
   const Shell shell;
   shell.must("flexspline completion bash >flexspline.bash");
   for (const char* command : {"demo", "identify", "diagnose", "plan", "pack", "record", "twin", "export", "fleet"}) {
@@ -66,7 +66,7 @@ TEST(StepwiseSelection, OffersTheOptionsThatHelpListsAndNoOther) {
   }
 }
 
-TEST(StepwiseSelection, ZshReadsItsScript) {
+TEST(Completion, ZshReadsItsScript) {
   const Shell shell;
   if (!is_there(shell, "zsh")) GTEST_SKIP() << "zsh is not installed";
   shell.must("flexspline completion zsh >_flexspline");
@@ -77,7 +77,7 @@ TEST(StepwiseSelection, ZshReadsItsScript) {
                        "registered _flexspline for flexspline\n_flexspline: function"));
 }
 
-TEST(StepwiseSelection, FishCompletesFromItsScript) {
+TEST(Completion, FishCompletesFromItsScript) {
   const Shell shell;
   if (!is_there(shell, "fish")) GTEST_SKIP() << "fish is not installed";
   shell.must("flexspline completion fish >flexspline.fish");
@@ -92,7 +92,7 @@ TEST(StepwiseSelection, FishCompletesFromItsScript) {
   EXPECT_TRUE(contains(offers("flexspline identify --method part"), "partitioned"));
 }
 
-TEST(StepwiseSelection, AnUnknownShellIsRefused) {
+TEST(Completion, AnUnknownShellIsRefused) {
   const Shell shell;
   const Answer answer = shell.run("flexspline completion tcsh");
   EXPECT_EQ(answer.code, 2);

@@ -1,7 +1,7 @@
 // sensitivity as a user runs it: what it says, its JSON, and arguments that cannot be meant.
 #include <gtest/gtest.h>
 
-#include "tests/cli/tool.hpp"
+#include "tests/cli/fitted_demo.hpp"
 
 namespace flexspline::cli_test::sensitivity_test {
 namespace {
@@ -10,18 +10,8 @@ namespace {
 constexpr const char* kLine =
     "flexspline sensitivity --model fitted.toml demo-out/free-sine-2hz-warm.csv demo-out/locked-sine-1hz-warm.csv";
 
-class SensitivityCommand : public testing::Test {
+class SensitivityCommand : public FittedDemo {
  protected:
-  // One recording and one fit for all tests of this file.
-  static void SetUpTestSuite() {
-    shell_ = new Shell;
-    shell_->record();
-    shell_->must("flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml");
-  }
-  static void TearDownTestSuite() {
-    delete shell_;
-    shell_ = nullptr;
-  }
   static const nlohmann::json& variant(const nlohmann::json& answer, const std::string& label) {
     for (const nlohmann::json& v : answer["variants"])
       if (v["label"] == label) return v;
@@ -32,9 +22,7 @@ class SensitivityCommand : public testing::Test {
       if (s["signal"] == signal && s["load"] == load) return s;
     throw std::runtime_error("no signal " + signal);
   }
-  static Shell* shell_;
 };
-Shell* SensitivityCommand::shell_ = nullptr;
 
 TEST_F(SensitivityCommand, JudgesEachEffectLeftOutAndEachScalingWorstFirst) {
   const nlohmann::json answer = shell_->json(std::string(kLine) + " --scale viscous_friction.coefficient=1.5");

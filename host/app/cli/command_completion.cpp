@@ -73,7 +73,7 @@ std::string bash(const std::vector<CommandText>& commands, const std::vector<std
       places += fmt::format("    '{} 2') {} ;;\n", command.help.name, bash_reply(*positional.front()));
     places += fmt::format("    '{} '*) {} ;;\n", command.help.name, bash_reply(*positional.back()));
   }
-  return fmt::format(R"(# StepwiseSelection of flexspline for bash: source it, or put it into /etc/bash_completion.d.
+  return fmt::format(R"(# Completion of flexspline for bash: source it, or put it into /etc/bash_completion.d.
 # Made by {}.
 _flexspline_effects='{}'
 _flexspline_words() {{
@@ -155,7 +155,7 @@ std::string zsh(const std::vector<CommandText>& commands, const std::vector<std:
     cases += "\n      ;;\n";
   }
   return fmt::format(R"(#compdef flexspline
-# StepwiseSelection of flexspline for zsh: put it as _flexspline into a folder of $fpath.
+# Completion of flexspline for zsh: put it as _flexspline into a folder of $fpath.
 # Made by {}.
 _flexspline() {{
   local -a commands
@@ -186,8 +186,7 @@ std::string fish_quoted(std::string_view text) {
 }
 std::string fish(const std::vector<CommandText>& commands, const std::vector<std::string>& effects) {
   std::string text = fmt::format(
-      "# StepwiseSelection of flexspline for fish: put it as flexspline.fish into ~/.config/fish/completions.\n# Made "
-      "by "
+      "# Completion of flexspline for fish: put it as flexspline.fish into ~/.config/fish/completions.\n# Made by "
       "{}.\nset -g __flexspline_effects {}\ncomplete -c flexspline -f\n",
       text::tool_name(), joined(effects));
   for (const CommandText& command : commands) {

@@ -103,7 +103,7 @@ class Guesser {
       for (const std::string& name : by_preference)
         if (is_free(name)) take(name, by_unit_only, current);
     for (const std::string& name : names_)
-      if (is_free(name)) take_beside_sensor(name);
+      if (is_free(name)) take_side_of_sensor(name);
     for (const std::string& name : names_)
       if ((is_free(name) || (is_left_out(name) && !is_source(name))) && !name.empty()) result_.unused.push_back(name);
     find_axis();
@@ -154,9 +154,9 @@ class Guesser {
     result_.columns.push_back({ours, name, r.unit, reason(name, r), scale});
   }
 
-  // A position or velocity whose name says no side, beside one that says that it is the motor's, is of the output where
-  // its first word is that of the torque sensor: "ankle_pos" with "motor_pos" and "ankle_torque".
-  void take_beside_sensor(const std::string& name) {
+  // A position or velocity whose name says no side, next to one that says that it is the motor's, is of the output
+  // where its first word is that of the torque sensor: "ankle_pos" with "motor_pos" and "ankle_torque".
+  void take_side_of_sensor(const std::string& name) {
     const ColumnReading& r = readings_[name];
     if ((r.kind != Kind::position && r.kind != Kind::velocity) || r.side != Side::open || r.set_point) return;
     const auto first_word = [](const std::string& text) { return text.substr(0, text.find_first_of("_. ")); };

@@ -10,7 +10,7 @@
 
 namespace flexspline::estimation {
 
-// ScoreAndInformation of a balance for parameters that are identified on another one, at their present values: the
+// What a balance says of parameters that are identified on another one, at their present values: the
 // score vector (gradient of its log likelihood) and the observed information, the balance's own parameters free.
 struct ScoreAndInformation {
   Eigen::VectorXd score;
@@ -23,8 +23,7 @@ Eigen::MatrixXd cross_balance_columns(const RegressionProblem& data, const Terms
                                       const std::vector<std::size_t>& parameters);
 
 // `cross_columns`: slopes of the requested parameters; `own`: of the balance's own parameters; `residual` at the
-// present values. `error_covariance` makes the samples' errors noise of one, of which `autocorrelation_time` samples
-// count as one.
+// present values. Of the whitened errors `autocorrelation_time` samples count as one.
 ScoreAndInformation score_and_information(const Eigen::MatrixXd& cross_columns, const Eigen::MatrixXd& own,
                                           const Eigen::VectorXd& residual, const NoiseCovariance& error_covariance,
                                           double autocorrelation_time);

@@ -12,13 +12,13 @@
 namespace flexspline::planning {
 namespace {
 
-// Above this margin less operator_effort counts more than more margin.
+// Above this margin less effort for the operator counts more than more margin.
 constexpr double kEnough = 10.0 * kDistinguished;
 // A motion that improves the result by less than a fifth is not worth its time.
 constexpr double kWorthwhile = 1.2;
 // Relative standard deviation at which a parameter is known well enough.
 constexpr double kPrecisePercent = 1.0;
-// Cost of one unit of operator_effort, in seconds of recording.
+// Cost of one unit of effort for the operator, in seconds of recording.
 constexpr double kTrouble_s = 15.0;
 
 // Factors of one balance: of what was recorded, and of each motion.
@@ -214,7 +214,7 @@ Design discriminate(const PlanRequest& request, std::string_view first, std::str
       more.push_back(m);
       const Separation s = separation(all, more, a, b);
       if (progress(s) < kWorthwhile * std::max(progress(*design.after), 1e-3)) continue;
-      // Above the required margin, the motion with the least operator_effort is chosen.
+      // Above the required margin, the motion with the least effort for the operator is chosen.
       const double merit = std::log(std::min(progress(s), kEnough)) - 0.3 * rehearsed.motions()[m].operator_effort +
                            0.01 * std::log(progress(s));
       if (merit > most) {

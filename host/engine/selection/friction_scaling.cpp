@@ -104,12 +104,12 @@ std::string chance_between_records(std::size_t records, double p_value) {
       p_value);
 }
 
-// Lists the effect that explains most of what differs between two or three records, where it is most of it: a line
-// through so few has no freedom left, or little.
+// Lists the effect that explains most of how three records differ: a line through three has one degree of freedom
+// left, and none through two.
 void list_of_few_records(const estimation::Identification& base, const RegressionProblem& data,
                          const std::vector<CandidateFit>& candidates, Diagnosis& result) {
-  const RecordFriction own = friction_by_record(base, data, 2);
-  if (own.parameters.empty() || own.records.size() >= kPolicy.fewest_of_scaling) return;
+  const RecordFriction own = friction_by_record(base, data, 3);
+  if (own.parameters.empty() || own.records.size() < 3 || own.records.size() >= kPolicy.fewest_of_scaling) return;
   const std::vector<Scaling> all = scalings(base, data, candidates, own);
   const auto best = std::max_element(all.begin(), all.end(), [](const Scaling& a, const Scaling& b) {
     return a.fit.explained_share < b.fit.explained_share;

@@ -74,8 +74,7 @@ class StabilitySelection {
   void filter_samples();
   SettingResult evaluate_setting(const BandwidthSamples& samples, bool mask, std::uint64_t seed) const;
   // Noise that the best model of all data leaves: first with the same friction in all records, then with random
-  // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the
-  // von_neumann_ratio.
+  // effects, which would otherwise count as slow noise. Sets `differences`, and of `result` the sums and the ratio.
   Noise noise_of_best(const Setting& setting, const std::vector<double>& weights, FrictionRandomEffects& differences,
                       SettingResult& result) const;
   // Chooses on each of policy.pairs pairs of halves, in both directions.
