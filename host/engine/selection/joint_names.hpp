@@ -15,9 +15,9 @@ struct JointNames {
 
 // Backward elimination (Miller, Subset Selection in Regression, 2002, section 3.4) of names that halves of the data
 // chose one by one. The likeliest candidate is in the model as well, where it gains something with all names in it: a
-// name that is not significant with it is encompassed by it (Mizon and Richard 1986), and it is named instead where halves
-// chose it, or held-out experiments confirm it where there are any. Only names that likelihood sees alone are taken
-// off; presliding is not judged, as likelihood leaves out the reversals where alone it shows.
+// name that is not significant with it is encompassed by it (Mizon and Richard 1986), and it is named instead where
+// halves chose it, or held-out experiments confirm it where there are any. Only names that likelihood sees alone are
+// taken off; presliding is not judged, as likelihood leaves out the reversals where alone it shows.
 JointNames eliminate_backward(const Resampling& resampling, const SearchedBalance& motor,
                               std::vector<NamedEffect> names);
 
