@@ -2,7 +2,7 @@
 // it.
 #include <gtest/gtest.h>
 
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/naming_rules.hpp"
 #include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection::selection_contradicted_test {

@@ -1,7 +1,7 @@
 // Which of two effects of one order over the motor's angle is named where an error of the phase makes them alike.
 #include <gtest/gtest.h>
 
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/group_members.hpp"
 
 namespace flexspline::selection::selection_likelier_waves_test {
 namespace {

@@ -2,7 +2,7 @@
 // experiments have to show so that it is named.
 #include <gtest/gtest.h>
 
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/deciding_method.hpp"
 
 namespace flexspline::selection::selection_unseen_by_halves_test {
 namespace {

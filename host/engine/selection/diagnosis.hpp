@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/engine/estimation/identify.hpp"
@@ -19,6 +20,7 @@ namespace flexspline::selection {
 struct NamedEffect {
   std::string effect;
   std::optional<double> order;
+  bool operator==(const NamedEffect&) const = default;
 };
 
 // The smallest effect that these data, with this model, would have shown.
@@ -143,6 +145,8 @@ struct Resampling {
   std::vector<Support> support;            // of all terms that could be chosen
   // The group that a name was found in.
   std::vector<NamedEffect> found_group(const NamedEffect& name) const;
+  // Whether these data could show an effect to resampling at all: what corrects the effort needs peaks of it.
+  bool is_visible(std::string_view effect) const;
   bool decides =
       false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
 };

@@ -5,20 +5,15 @@
 
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/effect_names.hpp"
 
 namespace flexspline::selection {
 namespace {
 
-bool is(const CandidateModel& model, const NamedEffect& name) {
-  return model.entry->name() == name.effect && model.order == name.order;
-}
-
 // Null: likelihood does not judge it.
-const CandidateFit* candidate_of(const SearchedBalance& motor, const NamedEffect& name) {
-  const auto at = std::find_if(motor.candidates.begin(), motor.candidates.end(),
-                               [&](const CandidateFit& t) { return is(t.model, name); });
-  return at == motor.candidates.end() || at->model.entry->is_presliding() ? nullptr : &*at;
+const CandidateFit* judged_candidate(const SearchedBalance& motor, const NamedEffect& name) {
+  const CandidateFit* candidate = candidate_named(motor, name);
+  return candidate && candidate->model.entry->is_presliding() ? nullptr : candidate;
 }
 
 // Whether a parameter of the added effect has a value that is not possible: the others explain more than there is.
@@ -50,17 +45,18 @@ LikelihoodGain gain_together(const BalanceSearch& with_others, const CandidateFi
 // likelihood does not judge it, or judges no other one.
 std::optional<double> score_with_others(const SearchedBalance& motor, const std::vector<NamedEffect>& names,
                                         const NamedEffect& name) {
-  if (!candidate_of(motor, name)) return std::nullopt;
+  if (!judged_candidate(motor, name)) return std::nullopt;
   Terms terms = motor.search.base.terms;
   const std::size_t before = terms.size();
   for (const NamedEffect& other : names)
-    if (const CandidateFit* c = candidate_of(motor, other); c && !is(c->model, name))
+    if (const CandidateFit* c = judged_candidate(motor, other); c && other != name)
       terms.push_back(c->fit.terms.back());
   if (terms.size() == before) return std::nullopt;
   BalanceSearch with_others{motor.search.data, motor.search.keep, {}, motor.search.floor};
   with_others.base = cross_validate(*motor.search.data, std::move(terms), motor.search.keep);
-  const std::vector<CandidateFit> own =
-      rank_candidates(with_others, [&](const CandidateModel& model) { return is(model, name); });
+  const std::vector<CandidateFit> own = rank_candidates(with_others, [&](const CandidateModel& model) {
+    return NamedEffect{std::string(model.entry->name()), model.order} == name;
+  });
   if (own.empty()) return std::nullopt;
   return is_impossible(own.front()) ? 0.0 : gain_together(with_others, own.front()).score;
 }
@@ -69,8 +65,7 @@ std::optional<double> score_with_others(const SearchedBalance& motor, const std:
 std::optional<NamedEffect> likeliest_other(const SearchedBalance& motor, const std::vector<NamedEffect>& names) {
   if (!motor.names_one() || motor.candidates.front().model.entry->is_presliding()) return std::nullopt;
   const NamedEffect first = name_of(motor.candidates.front());
-  if (std::any_of(names.begin(), names.end(), [&](const NamedEffect& n) { return is_of_family(n, first); }))
-    return std::nullopt;
+  if (contains_family(names, motor.candidates.front())) return std::nullopt;
   const std::optional<double> score = score_with_others(motor, names, first);
   return score && *score > kPolicy.named_score ? std::optional(first) : std::nullopt;
 }
@@ -92,7 +87,7 @@ JointNames eliminate_backward(const Resampling& resampling, const SearchedBalanc
     double least = 0.0;
     auto worst = names.end();
     for (auto name = names.begin(); name != names.end(); ++name) {
-      const CandidateFit* alone = candidate_of(motor, *name);
+      const CandidateFit* alone = judged_candidate(motor, *name);
       if (!alone || alone->gain.score <= kPolicy.named_score) continue;
       const std::optional<double> score = score_with_others(motor, names, *name);
       if (!score || *score > least) continue;
@@ -104,7 +99,7 @@ JointNames eliminate_backward(const Resampling& resampling, const SearchedBalanc
     names.erase(worst);
   }
   if (other && (joint.eliminated.empty() || !may_replace(resampling, motor.candidates.front())))
-    std::erase_if(names, [&](const NamedEffect& n) { return n.effect == other->effect && n.order == other->order; });
+    std::erase(names, *other);
   joint.names = std::move(names);
   return joint;
 }

@@ -7,6 +7,8 @@
 
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/confounding.hpp"
+#include "host/engine/selection/deciding_method.hpp"
+#include "host/engine/selection/effect_names.hpp"
 #include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/policy.hpp"
@@ -41,19 +43,13 @@ std::string choose_named(SearchedBalance& chosen) {
 
 namespace {
 
-bool is(const Candidate& c, const NamedEffect& n) {
-  return c.effect == n.effect && c.order == n.order;
-}
-
 // Whether resampling could not distinguish a candidate from the first one, and it leaves a similar error on all data.
 bool is_in_group(const std::optional<Resampling>& resampling, const CandidateFit& first, const CandidateFit& t) {
   if (!resampling) return false;
-  const auto group = resampling->found_group({std::string(first.model.entry->name()), first.model.order});
+  const auto group = resampling->found_group(name_of(first));
   return t.gain.chi2_percent >= kPolicy.similar * first.gain.chi2_percent &&
          100.0 - t.gain.chi2_percent <= kPolicy.similar_left * (100.0 - first.gain.chi2_percent) &&
-         std::any_of(group.begin(), group.end(), [&](const NamedEffect& n) {
-           return n.effect == t.model.entry->name() && n.order == t.model.order;
-         });
+         contains(group, name_of(t));
 }
 
 // The first candidate, and what cannot be distinguished from it.
@@ -83,39 +79,24 @@ std::vector<NamedEffect> likely_names(const SearchedBalance& chosen, const std::
 void put_first(Diagnosis& result) {
   auto begin = result.candidates.begin();
   for (const NamedEffect& n : result.named) {
-    const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return is(c, n); });
+    const auto at = std::find_if(begin, result.candidates.end(), [&](const Candidate& c) { return name_of(c) == n; });
     if (at != result.candidates.end()) std::rotate(begin++, at, at + 1);
   }
 }
 
 }  // namespace
 
-void add_effects_of_angle(Resampling& resampling, const SearchedBalance& motor) {
-  const auto has = [](const Resampling::FoundTerm& found, const CandidateFit& t) {
-    return std::any_of(found.group.begin(), found.group.end(),
-                       [&](const NamedEffect& n) { return is_of_family(n, name_of(t)); });
-  };
-  for (Resampling::FoundTerm& found : resampling.found) {
-    const auto first = std::find_if(motor.candidates.begin(), motor.candidates.end(),
-                                    [&](const CandidateFit& t) { return has(found, t); });
-    if (first == motor.candidates.end()) continue;
-    for (const CandidateFit& t : motor.candidates)
-      if (!has(found, t) && is_angle_confounded(*first, t)) found.group.push_back(name_of(t));
-  }
-}
-
 void name_by_likelihood(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result) {
   result.named = likely_names(chosen, alias, result.resampling);
   result.verdict = result.named.size() > 1 ? Verdict::confusable_effects : Verdict::missing_effect;
   for (Candidate& c : result.candidates) {
-    if (std::none_of(result.named.begin(), result.named.end(), [&](const NamedEffect& n) { return is(c, n); }))
-      continue;
+    if (!contains(result.named, name_of(c))) continue;
     const CandidateFit* fit = nullptr;
     for (const CandidateFit& t : chosen.candidates)
-      if (is(c, name_of(t))) fit = &t;
+      if (name_of(c) == name_of(t)) fit = &t;
     if (fit != nullptr && fit->order_is_not_identifiable) c.admit();
     for (const NamedEffect& other : result.named)
-      if (!is(c, other)) c.cannot_distinguish.push_back(other.effect);
+      if (name_of(c) != other) c.cannot_distinguish.push_back(other.effect);
   }
   put_first(result);
 }
@@ -126,7 +107,7 @@ namespace {
 // term.
 StableNames own_names(SearchedBalance& balance, const Diagnosis& result) {
   const bool is_motor = balance.search.data->balance() == estimation::Balance::motor;
-  if (is_motor && result.resampling && resampling_decides(*result.resampling, balance))
+  if (is_motor && result.resampling && deciding_method(*result.resampling, balance) == Method::resampling)
     return stable_names(*result.resampling, balance);
   if (!balance.names_one()) return {};
   const std::string alias = choose_named(balance);
@@ -183,7 +164,7 @@ void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBal
     for (const NamedEffect& n : names) {
       result.named.push_back(n);
       for (Candidate& c : result.candidates)
-        if (is(c, n)) c.admit();
+        if (name_of(c) == n) c.admit();
     }
     explain_named(balance.search, balance.candidates, drive, result);
   }

@@ -12,9 +12,6 @@ namespace flexspline::selection {
 // Puts the effect to name first. Returns the name of an effect that it is named for as well, if there is one.
 std::string choose_named(SearchedBalance& chosen);
 
-// Groups what was found with effects of the angle that likelihood does not distinguish from it.
-void add_effects_of_angle(Resampling& resampling, const SearchedBalance& motor);
-
 // Names the first candidate of the balance that decides, and what cannot be distinguished from it.
 void name_by_likelihood(const SearchedBalance& chosen, const std::string& alias, Diagnosis& result);
 

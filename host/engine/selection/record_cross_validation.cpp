@@ -100,7 +100,7 @@ RecordCrossValidation cross_validate_by_record(const BalanceSearch& search, cons
 }
 
 bool is_within_floor_of_few_records(const BalanceSearch& search) {
-  return search.data->records().size() < estimation::kFewestRecords && search.at_floor(search.base);
+  return search.at_floor(search.base) && search.data->records().size() < estimation::kFewestRecords;
 }
 
 void check_by_record(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {

@@ -166,8 +166,12 @@ bool Resampling::FoundTerm::is_confirmed() const {
 std::vector<NamedEffect> Resampling::found_group(const NamedEffect& name) const {
   for (const FoundTerm& one : found)
     for (const NamedEffect& n : one.group)
-      if (n.effect == name.effect && n.order == name.order) return one.group;
+      if (n == name) return one.group;
   return {};
+}
+
+bool Resampling::is_visible(std::string_view effect) const {
+  return std::find(not_visible.begin(), not_visible.end(), effect) == not_visible.end();
 }
 
 }  // namespace flexspline::selection

@@ -8,7 +8,7 @@
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/diagnosis.hpp"
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/effect_names.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 

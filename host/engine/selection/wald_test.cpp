@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "host/common/numbers/distributions.hpp"
-#include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/effect_names.hpp"
 #include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
@@ -35,7 +35,7 @@ namespace {
 // experiments that are held out confirm the name.
 Candidate* insignificant(Diagnosis& result, const NamedEffect& name) {
   const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
-                               [&](const Candidate& c) { return c.effect == name.effect && c.order == name.order; });
+                               [&](const Candidate& c) { return name_of(c) == name; });
   if (at == result.candidates.end() || is_confirmed_by_held_out(result, name)) return nullptr;
   const std::optional<double> p = wald_p_value(*at);
   return p && *p > kPolicy.wald_p_value ? &*at : nullptr;

@@ -1,0 +1,18 @@
+// The candidates of a diagnosis, as the user is told of them.
+#pragma once
+
+#include <vector>
+
+#include "host/engine/selection/diagnosis.hpp"
+#include "host/engine/selection/searched_balance.hpp"
+
+namespace flexspline::selection {
+
+// Adds the candidates of all balances to the result, admissible ones first and by their score, each with the smallest
+// size that would be named, and a warning for what cannot be distinguished from the model.
+void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnosis& result);
+
+// Adds what on this drive makes the orders of candidates.
+void explain_orders(const model::Drive& drive, Diagnosis& result);
+
+}  // namespace flexspline::selection

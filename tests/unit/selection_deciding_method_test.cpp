@@ -1,0 +1,109 @@
+// Which method decides on the motor's balance, rule by rule.
+#include <gtest/gtest.h>
+
+#include "host/engine/selection/deciding_method.hpp"
+#include "host/engine/selection/policy.hpp"
+
+namespace flexspline::selection::selection_deciding_method_test {
+namespace {
+
+// A balance with a known noise of 1, whose error is 10, and 5 with its one candidate.
+SearchedBalance motor_with(std::string_view effect) {
+  SearchedBalance motor;
+  motor.floor.rmse = 1.0;
+  CandidateFit candidate;
+  candidate.model.entry = &catalogue::get(effect);
+  candidate.gain.score = kPolicy.named_score + 100.0;
+  candidate.gain.chi2_percent = 75.0;
+  candidate.fit.residual = Eigen::VectorXd::Constant(100, 5.0);
+  candidate.fit.root_weights = Eigen::VectorXd::Ones(100);
+  motor.search.base.residual = Eigen::VectorXd::Constant(100, 10.0);
+  motor.search.base.root_weights = Eigen::VectorXd::Ones(100);
+  motor.candidates = {candidate};
+  return motor;
+}
+
+Resampling halves_that_chose(std::string_view effect, double frequency) {
+  Resampling resampling;
+  resampling.subsamples = 100.0;
+  resampling.support = {{std::string(effect), std::nullopt, frequency}};
+  return resampling;
+}
+
+Resampling::FoundTerm found(std::string_view effect) {
+  Resampling::FoundTerm term;
+  term.group = {{std::string(effect), std::nullopt}};
+  term.frequency = 0.8;
+  term.share_percent = 40.0;
+  return term;
+}
+
+TEST(DecidingMethod, IsLikelihoodWhereNothingCanBeResampled) {
+  EXPECT_EQ(deciding_method(Resampling{}, motor_with("quadratic_drag")), Method::likelihood);
+  Resampling too_little;
+  too_little.too_little = true;
+  EXPECT_EQ(deciding_method(too_little, motor_with("quadratic_drag")), Method::resampling);
+}
+
+TEST(DecidingMethod, IsResamplingWhereLikelihoodNamesNothing) {
+  SearchedBalance motor = motor_with("quadratic_drag");
+  motor.candidates.clear();
+  EXPECT_EQ(deciding_method(halves_that_chose("quadratic_drag", 0.0), motor), Method::resampling);
+}
+
+TEST(DecidingMethod, IsResamplingForPreslidingAsLikelihoodLeavesOutReversals) {
+  EXPECT_EQ(deciding_method(halves_that_chose("dahl_friction", 1.0), motor_with("dahl_friction")), Method::resampling);
+}
+
+TEST(DecidingMethod, IsLikelihoodForWhatHalvesCannotChooseAndExplainsNearlyAll) {
+  SearchedBalance motor = motor_with("current_saturation");
+  Resampling nothing;
+  nothing.subsamples = 100.0;
+  EXPECT_EQ(deciding_method(nothing, motor), Method::resampling);
+  motor.candidates.front().gain.chi2_percent = kPolicy.nearly_all_percent + 0.5;
+  EXPECT_EQ(deciding_method(nothing, motor), Method::likelihood);
+}
+
+TEST(DecidingMethod, IsResamplingWhereHalvesFoundOtherEffectsOnly) {
+  SearchedBalance motor = motor_with("quadratic_drag");
+  motor.candidates.front().fit.residual.setConstant(1.2);
+  Resampling others = halves_that_chose("quadratic_drag", 0.9);
+  EXPECT_EQ(deciding_method(others, motor), Method::likelihood);
+  others.found = {found("coulomb_asymmetry")};
+  EXPECT_EQ(deciding_method(others, motor), Method::resampling);
+}
+
+TEST(DecidingMethod, IsResamplingWhereHalvesDidNotChooseTheLikeliestUnlessMostAbstained) {
+  SearchedBalance motor = motor_with("quadratic_drag");
+  motor.candidates.front().fit.residual.setConstant(1.2);
+  Resampling few = halves_that_chose("quadratic_drag", kPolicy.named_frequency - 0.1);
+  EXPECT_EQ(deciding_method(few, motor), Method::resampling);
+  few.abstained = 100.0 * kPolicy.most_abstaining + 1.0;
+  EXPECT_EQ(deciding_method(few, motor), Method::likelihood);
+}
+
+TEST(DecidingMethod, IsResamplingWhereANoisyTorqueMayBeExplained) {
+  SearchedBalance motor = motor_with("load_dependent_friction");
+  motor.candidates.front().fit.residual.setConstant(1.2);
+  Resampling resampling = halves_that_chose("load_dependent_friction", 0.9);
+  EXPECT_EQ(deciding_method(resampling, motor), Method::likelihood);
+  resampling.torque_has_noise = true;
+  EXPECT_EQ(deciding_method(resampling, motor), Method::resampling);
+}
+
+TEST(DecidingMethod, IsLikelihoodWhereItsEffectLeavesTheNoiseAndResamplingWhereStructureRemains) {
+  SearchedBalance motor = motor_with("quadratic_drag");
+  const Resampling resampling = halves_that_chose("quadratic_drag", 0.9);
+  EXPECT_EQ(deciding_method(resampling, motor), Method::resampling);
+  motor.candidates.front().fit.residual.setConstant(kPolicy.at_floor - 0.01);
+  EXPECT_EQ(deciding_method(resampling, motor), Method::likelihood);
+}
+
+TEST(DecidingMethod, LastRuleAlwaysApplies) {
+  const Resampling resampling;
+  const SearchedBalance motor;
+  EXPECT_TRUE(deciding_rules().back().applies({resampling, motor}));
+}
+
+}  // namespace
+}  // namespace flexspline::selection::selection_deciding_method_test
