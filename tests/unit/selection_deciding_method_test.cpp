@@ -1,8 +1,13 @@
 // Which method decides on the motor's balance, rule by rule.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host/engine/selection/deciding_method.hpp"
 #include "host/engine/selection/policy.hpp"
+#include "shared/fixed/turn.hpp"
+#include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::selection::selection_deciding_method_test {
 namespace {
@@ -97,6 +102,40 @@ TEST(DecidingMethod, IsLikelihoodWhereItsEffectLeavesTheNoiseAndResamplingWhereS
   EXPECT_EQ(deciding_method(resampling, motor), Method::resampling);
   motor.candidates.front().fit.residual.setConstant(kPolicy.at_floor - 0.01);
   EXPECT_EQ(deciding_method(resampling, motor), Method::likelihood);
+}
+
+// Records of an axis with friction and inertia.
+data::Dataset records(int count) {
+  data::Dataset dataset;
+  for (int k = 0; k < count; ++k)
+    dataset.experiments.push_back(
+        tests::written_experiment(std::to_string(k), 2e-3, 2000, [&](double t, data::Experiment& e) {
+          const double rate = kTurn * (0.4 + 0.1 * k), w = 30.0 * rate * std::cos(rate * t);
+          e[data::Column::motor_position].push_back(30.0 * std::sin(rate * t));
+          e[data::Column::motor_torque].push_back(-3e-3 * rate * rate * std::sin(rate * t) + 1e-3 * w +
+                                                  std::copysign(0.05, w));
+        }));
+  return dataset;
+}
+
+// Where the noise is not known, white noise hides small other causes that the effect resembles.
+TEST(DecidingMethod, OfUnknownNoiseIsLikelihoodOnlyForAnEffectThatMattersInThreeRecordsThatLeaveWhiteNoise) {
+  Resampling resampling = halves_that_chose("quadratic_drag", 0.9);
+  const auto method = [&](int count, double percent) {
+    const data::Dataset dataset = records(count);
+    const auto identified = estimation::identify(dataset, tests::plain_model(), {});
+    SearchedBalance motor = motor_with("quadratic_drag");
+    motor.floor.rmse.reset();
+    motor.search.data = &identified->data.front();
+    motor.candidates.front().gain.chi2_percent = percent;
+    return deciding_method(resampling, motor);
+  };
+  resampling.von_neumann_ratio = 1.0;
+  EXPECT_EQ(method(3, 5.0), Method::likelihood);
+  EXPECT_EQ(method(3, 4.9), Method::resampling);
+  EXPECT_EQ(method(2, 5.0), Method::resampling);
+  resampling.von_neumann_ratio = 0.9;
+  EXPECT_EQ(method(3, 5.0), Method::resampling);
 }
 
 TEST(DecidingMethod, LastRuleAlwaysApplies) {

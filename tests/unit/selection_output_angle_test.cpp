@@ -8,31 +8,38 @@
 namespace flexspline::selection::selection_output_angle_test {
 namespace {
 
-// A balance with one candidate of that score, and no known floor.
-SearchedBalance balance(std::string_view effect, double score) {
+// A balance with one candidate of that score, which takes off a share of the squared error. No noise is known.
+SearchedBalance balance(std::string_view effect, double score, double percent) {
   SearchedBalance motor;
   motor.search.base.left_out = {{100.0, 100.0}};
   CandidateFit candidate;
   candidate.model.entry = &catalogue::get(effect);
   candidate.gain.score = score;
+  candidate.gain.chi2_percent = percent;
   motor.candidates = {candidate};
   return motor;
 }
 
 // All subsamples chose it.
-bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio) {
+bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio, double percent = 10.0) {
   Resampling resampling;
   resampling.subsamples = 100.0;
   Resampling::FoundTerm found;
   found.group = {{std::string(effect), std::nullopt}};
   found.frequency = 1.0;
   found.held_out_ratio = held_out_ratio;
-  return may_be_stated(resampling, found, balance(effect, score));
+  return may_be_stated(resampling, found, balance(effect, score, percent));
 }
 
 TEST(OutputAngle, AnEffectOfItNeedsALikelihoodThatIsSignificant) {
   EXPECT_TRUE(is_stated("gravity", kPolicy.named_score + 1.0, std::nullopt));
   EXPECT_FALSE(is_stated("gravity", kPolicy.named_score - 1.0, std::nullopt));
+}
+
+// A cable that drags a little with the angle looks like a weight.
+TEST(OutputAngle, ASmallEffectIsNotStatedWhereTheNoiseIsNotKnown) {
+  EXPECT_TRUE(is_stated("gravity", kPolicy.named_score + 30.0, std::nullopt, 5.0));
+  EXPECT_FALSE(is_stated("gravity", kPolicy.named_score + 30.0, std::nullopt, 4.9));
 }
 
 TEST(OutputAngle, OrHalfOfTheSquaredHeldOutError) {

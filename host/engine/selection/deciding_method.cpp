@@ -108,12 +108,14 @@ bool likeliest_may_explain_noise(const BothMethods& b) {
 
 // Where more than one effect is missing, structure remains whatever is added, and a small decrease proves nothing.
 // Where the noise floor is unknown, the residual must be white, of three records or more, as what is peculiar to one
-// motion may be white in its own record; and an effect of the effort alone is not taken, as it may explain its own
-// noise.
+// motion may be white in its own record; an effect of the effort alone is not taken, as it may explain its own noise;
+// and the effect must matter, as white noise hides small other causes that it resembles (a cable that drags with the
+// angle looks like a weight).
 bool likeliest_leaves_noise(const BothMethods& b) {
   if (b.motor.floor.rmse) return likeliest(b).fit.rmse() < kPolicy.at_floor * *b.motor.floor.rmse;
   if (b.motor.search.data->records().size() < estimation::kFewestRecords) return false;
-  return b.resampling.von_neumann_ratio >= kPolicy.white && !is_of_effort(likeliest(b));
+  return b.resampling.von_neumann_ratio >= kPolicy.white && !is_of_effort(likeliest(b)) &&
+         likeliest(b).gain.chi2_percent >= 100.0 * kPolicy.line_share;
 }
 
 bool always(const BothMethods&) {

@@ -64,6 +64,10 @@ std::string why_undecided(const Resampling::FoundTerm& term) {
 
 // Why resampling does not name what likelihood would.
 std::string why_not_chosen(const Resampling& resampling, const CandidateFit& likeliest) {
+  if (likeliest.gain.chi2_percent < 100.0 * kPolicy.line_share)
+    return fmt::format(
+        "it explains {:.1f} % of the squared error, and {:.0f} % are needed where the noise is not known",
+        likeliest.gain.chi2_percent, 100.0 * kPolicy.line_share);
   const std::optional<double> support = support_of(resampling, likeliest);
   if (!support || !resampling.is_visible(likeliest.model.entry->name()))
     return "halves of the data cannot judge it here";
@@ -80,9 +84,9 @@ std::optional<PossibleEffect> likeliest_alone(const Resampling& resampling, cons
   const CandidateFit& first = motor.candidates.front();
   const bool is_listed =
       std::ranges::any_of(listed, [&](const PossibleEffect& p) { return contains_family(p.group, first); });
-  if (contains_family(named, first) || is_listed || first.model.entry->is_presliding() ||
-      first.gain.chi2_percent < 100.0 * kPolicy.line_share)
-    return std::nullopt;
+  // Far above a known floor a small decrease of the error proves nothing.
+  const bool is_small = motor.floor.rmse && first.gain.chi2_percent < 100.0 * kPolicy.line_share;
+  if (contains_family(named, first) || is_listed || is_small || first.model.entry->is_presliding()) return std::nullopt;
   return PossibleEffect{{name_of(first)},
                         fmt::format("its likelihood is significant (score {:.0f}), but {}", first.gain.score,
                                     why_not_chosen(resampling, first)),

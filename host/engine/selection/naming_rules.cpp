@@ -12,10 +12,12 @@
 namespace flexspline::selection {
 namespace {
 
-// Whether the likelihood of all data is significant for an effect.
+// Whether the likelihood of all data is significant for an effect, and, where the noise is not known, the effect takes
+// off as much as a term must: white noise hides small other causes that it resembles.
 bool is_significant(const SearchedBalance& motor, const NamedEffect& name) {
-  return std::any_of(motor.candidates.begin(), motor.candidates.end(), [&](const CandidateFit& candidate) {
-    return is_of_family(name, candidate) && candidate.gain.score > kPolicy.named_score;
+  return std::ranges::any_of(motor.candidates, [&](const CandidateFit& candidate) {
+    return is_of_family(name, candidate) && candidate.gain.score > kPolicy.named_score &&
+           (motor.floor.rmse || candidate.gain.chi2_percent >= 100.0 * kPolicy.line_share);
   });
 }
 
@@ -87,7 +89,8 @@ bool is_supported(const FoundOnMotor& e) {
 std::string is_not_supported(const FoundOnMotor& e) {
   if (is_of_output_angle(e.found.group.front()))
     return "other functions of the output's angle look like it on these data: its likelihood would have to be "
-           "significant, or the squared error on experiments that are held out to fall by half";
+           "significant, with 5 % of the squared error where the noise is not known, or the squared error on "
+           "experiments that are held out to fall by half";
   if (e.found.held_out_ratio && !e.found.is_confirmed()) return how_held_out_falls(e.found);
   return std::string(kNearNoise);
 }
