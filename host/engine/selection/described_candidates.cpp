@@ -78,12 +78,8 @@ void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnos
       const CandidateFit& t = e.candidates[i];
       result.candidates.push_back(candidate_of(t, e.search, axis));
       result.candidates.back().minimum_detectable = std::move(smallest[i]);
-      if (t.confounded_with.empty()) continue;
-      result.candidates.back().confounding_reasons.push_back(compare_with_model(e.search, t));
-      result.warnings.push_back(
-          fmt::format("{0} cannot be distinguished from {1} in these data: {1} is named for what both share; {2} would "
-                      "separate them",
-                      t.model.entry->name(), t.confounded_with, t.model.entry->info->separated_by));
+      if (!t.confounded_with.empty())
+        result.candidates.back().confounding_reasons.push_back(compare_with_model(e.search, t));
     }
   }
   std::stable_sort(result.candidates.begin(), result.candidates.end(), [](const Candidate& a, const Candidate& b) {

@@ -9,7 +9,7 @@
 namespace flexspline::selection {
 
 // Adds the candidates of all balances to the result, admissible ones first and by their score, each with the smallest
-// size that would be named, and a warning for what cannot be distinguished from the model.
+// size that would be named, and what of the model it cannot be distinguished from.
 void list_candidates(std::vector<SearchedBalance>& all, data::Axis axis, Diagnosis& result);
 
 // Adds what on this drive makes the orders of candidates.

@@ -128,11 +128,12 @@ void name_jointly(const SearchedBalance& motor, Diagnosis& result) {
   std::erase_if(result.possible, [&](const PossibleEffect& p) {
     return p.group.size() == 1 && contains(result.named, p.group.front());
   });
-  for (NamedEffect& name : joint.eliminated)
-    result.possible.push_back({{std::move(name)},
-                               "once the other effects are in the model, left-out data gain nothing by it",
-                               std::nullopt,
-                               std::nullopt});
+  for (NamedEffect& name : joint.eliminated) {
+    PossibleEffect eliminated;
+    eliminated.group.push_back(std::move(name));
+    eliminated.why_not = "once the other effects are in the model, left-out data gain nothing by it";
+    result.possible.push_back(std::move(eliminated));
+  }
 }
 
 // Puts the candidates of the names first, in their order; an effect that likelihood does not judge gets one.

@@ -17,6 +17,13 @@ using text::NodeKind;
 
 constexpr std::string_view kFormat = "flexspline-dataset/1";
 
+// The same file without "..", for messages; as it was where a symbolic link makes that another file.
+std::filesystem::path without_dots(std::filesystem::path path) {
+  std::error_code failed;
+  std::filesystem::path shorter = path.lexically_normal();
+  return std::filesystem::equivalent(shorter, path, failed) ? shorter : path;
+}
+
 class Reader {
  public:
   Reader(std::filesystem::path path, Findings& findings) : findings_(findings) { toml_.file = std::move(path); }
@@ -195,7 +202,7 @@ class Reader {
                     "write file = \"NAME.csv\"");
       return;
     }
-    if (entry.file.is_relative()) entry.file = toml_.file.parent_path() / entry.file;
+    if (entry.file.is_relative()) entry.file = without_dots(toml_.file.parent_path() / entry.file);
     if (entry.from_s && entry.to_s && !(*entry.from_s < *entry.to_s))
       findings_.add(Severity::error, "key", file(), entry.line, "",
                     fmt::format("from_s = {} is not before to_s = {}", *entry.from_s, *entry.to_s),

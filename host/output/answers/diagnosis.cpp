@@ -274,6 +274,19 @@ void print_possible(Console& console, const std::vector<selection::PossibleEffec
   }
 }
 
+// Candidates that are one with an effect of the model on these data.
+void print_confounded_with_model(Console& console, const Diagnosis& d) {
+  for (const Candidate& c : d.candidates) {
+    const bool is_named = std::any_of(d.named.begin(), d.named.end(),
+                                      [&](const auto& n) { return n.effect == c.effect && n.order == c.order; });
+    const catalogue::Entry* entry = catalogue::find(c.effect);
+    if (is_named || c.confounding_reasons.empty() || entry == nullptr) continue;
+    console.line(wrapped(fmt::format("{} cannot be distinguished from {} of the model here. They are separated by {}.",
+                                     effect_label(c.effect, c.order), c.confounding_reasons.front().effect,
+                                     entry->info->separated_by)));
+  }
+}
+
 void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
   console.line(console.bold(verdict_in_words(d)));
   console.line(wrapped(evidence(d)));
@@ -290,6 +303,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d));
+    print_confounded_with_model(console, d);
   }
   for (const selection::Trend& t : d.parameter_trends)
     console.line(
