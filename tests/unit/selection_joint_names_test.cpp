@@ -78,6 +78,18 @@ TEST_F(NamesTogether, TheLikeliestReplacesWhatItMakesNeedlessWhereHalvesChoseIt)
   EXPECT_EQ(effects(unchosen.eliminated), std::vector<std::string>{"stribeck_gaussian"});
 }
 
+// The likeliest has a memory, say, so that halves cannot choose it.
+TEST_F(NamesTogether, TheLikeliestThatHalvesCannotJudgeIsAGroupWithWhatTheCatalogueHasAsConfused) {
+  const NamedEffect power{"power_law_friction", std::nullopt};
+  const SearchedBalance& motor = axis(0.0);
+  const JointNames joint = eliminate_backward(found({power}), motor, {power});
+  EXPECT_TRUE(joint.is_group);
+  EXPECT_EQ(effects(joint.names), (std::vector<std::string>{"power_law_friction", "quadratic_drag"}));
+  Resampling judged = found({power});
+  judged.support = {{"quadratic_drag", std::nullopt, 0.2}};
+  EXPECT_FALSE(eliminate_backward(judged, motor, {power}).is_group);
+}
+
 TEST_F(NamesTogether, HeldOutExperimentsDecideWhetherItReplacesWhereThereAreAny) {
   SearchedBalance& motor = axis(0.0);
   motor.candidates.front().held_out_ratio = 0.999;

@@ -70,6 +70,19 @@ TEST(NamingRules, RefuseASecondChoiceWithoutConfirmation) {
   EXPECT_NE(why_not(term).find("only after another one was refused"), std::string::npos);
 }
 
+// Stick phases look like presliding in some halves.
+TEST(NamingRules, RefusePreslidingThatFewerThanNineOfTenHalvesChoseUnlessHeldOutDataConfirmIt) {
+  Resampling::FoundTerm term = found({"dahl_friction"});
+  term.frequency = 0.7;
+  EXPECT_EQ(why_not(term), "");
+  term.held_out_ratio.reset();
+  EXPECT_EQ(why_not(term), "without experiments that are held out 90 of 100 are needed");
+  term.held_out_ratio = 0.99;
+  EXPECT_EQ(why_not(term), "the error on experiments that are held out falls by 1.0 % only");
+  term.frequency = kPolicy.certain_frequency;
+  EXPECT_EQ(why_not(term), "");
+}
+
 TEST(NamingRules, RefuseAGroupBehindANameAndAnythingBehindAGroup) {
   EXPECT_EQ(why_not(found({"quadratic_drag", "power_law_friction"})), "");
   EXPECT_NE(why_not(found({"quadratic_drag", "power_law_friction"}), kBefore).find("cannot be distinguished"),

@@ -53,6 +53,16 @@ TEST(EffectThatHalvesCannotChoose, MayBeALagThatExplainsMostOfTheErrorAndOfThatO
   EXPECT_FALSE(stands_alone(lags, delay(3.0, 0.70)));
 }
 
+TEST(EffectThatHalvesCannotChoose, WithoutHeldOutDataALagThatExplainsMostNeedsAFifthOfTheLeftOutSquares) {
+  Resampling leads = nothing_found();
+  leads.lag_s = -5e-3;
+  leads.lag_share = 0.6;
+  EXPECT_TRUE(stands_alone(leads, delay(20.0, std::nullopt)));
+  EXPECT_FALSE(stands_alone(leads, delay(19.9, std::nullopt)));
+  leads.lag_share = 0.49;
+  EXPECT_FALSE(stands_alone(leads, delay(80.0, std::nullopt)));
+}
+
 TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHalvesFindSomethingElse) {
   Resampling resampling = nothing_found();
   Resampling::FoundTerm found;

@@ -6,7 +6,7 @@ file(READ ${workbench_built}/page.css WORKBENCH_STYLE)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS
   ${workbench_built}/index.html ${workbench_built}/page.js ${workbench_built}/page.css)
 configure_file(${PROJECT_SOURCE_DIR}/host/app/workbench/assets.cpp.in ${PROJECT_BINARY_DIR}/generated/host/app/workbench/assets.cpp @ONLY)
-target_sources(flexspline_host PRIVATE ${PROJECT_BINARY_DIR}/generated/host/app/workbench/assets.cpp)
+target_sources(flexspline_outer PRIVATE ${PROJECT_BINARY_DIR}/generated/host/app/workbench/assets.cpp)
 # Both compilers take longer texts than the language promises.
 set_source_files_properties(${PROJECT_BINARY_DIR}/generated/host/app/workbench/assets.cpp PROPERTIES
   COMPILE_OPTIONS -Wno-overlength-strings)

@@ -165,7 +165,9 @@ void RecordSignals::copy(std::size_t first, std::span<Inputs> to, unsigned reads
       in.torque_magnitude = std::abs(in.torque);
     });
   if (reads & kCurrent)
-    block.along([&](Inputs& in, std::size_t k) { in.current = current.empty() ? 0.0 : current[k]; });
+    block.along([&, is_modelled = (reads & kModelledCurrent) && !modelled_current.empty()](Inputs& in, std::size_t k) {
+      in.current = is_modelled ? modelled_current[k] : current.empty() ? 0.0 : current[k];
+    });
   if (reads & kTemperature) block.along([&](Inputs& in, std::size_t k) { in.temperature = temperature_at(k); });
 }
 
@@ -208,6 +210,7 @@ RecordSignals RecordSignals::every(std::size_t step) const {
       keep(!torque.empty(), few.torque, in.torque);
       keep(!temperature.empty(), few.temperature, in.temperature);
       keep(!current.empty(), currents, in.current);
+      if (!modelled_current.empty()) few.modelled_current.push_back(modelled_current[k]);
       few.directions[kMotor].push_back(in.direction);
       few.directions[kTransmission].push_back(in.torsion_direction);
       few.directions[kLoad].push_back(in.output_direction);

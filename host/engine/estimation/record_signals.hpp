@@ -38,6 +38,9 @@ class ScaledSignal {
 class RecordSignals {
  public:
   using Inputs = effects::Inputs<catalogue::Real>;
+  // With the bits of effects::Signals: the modelled current where there is one.
+  static constexpr unsigned kModelledCurrent = 1U << 31;
+  static constexpr unsigned kAll = ~kModelledCurrent;
 
   // Empty: not measured, and zero, unless it follows from others. Accelerations that are empty are slopes of the
   // velocities, directions that are empty are made of velocities and their noise.
@@ -46,6 +49,9 @@ class RecordSignals {
   std::vector<double> torque;  // filtered as positions are
   std::vector<double> temperature;
   ScaledSignal current;
+  // The current that a model makes of the motion, for effects with a memory of the current: with a measured one they
+  // average its noise, and explain the noise of the effort with it. Empty: they read the measured one.
+  std::vector<double> modelled_current;
   std::array<std::vector<double>, 3> directions;  // by balance: of velocity, torsion rate, output velocity
 
   std::vector<data::Segment> segments;
@@ -61,12 +67,12 @@ class RecordSignals {
   std::size_t size() const { return size_; }
 
   // Signals of a sample, all or at least those that `reads` names: for single samples; `copy` costs less along many.
-  Inputs operator[](std::size_t sample) const { return at(sample, ~0U); }
+  Inputs operator[](std::size_t sample) const { return at(sample, kAll); }
   Inputs at(std::size_t sample, unsigned reads) const;
   // Signals of the samples from `first` on; at least those that `reads` (bits of effects::Signals) names.
-  void copy(std::size_t first, std::span<Inputs> to, unsigned reads = ~0U) const;
+  void copy(std::size_t first, std::span<Inputs> to, unsigned reads = kAll) const;
   // The same for what takes inputs a block at a time. It must not outlive this.
-  catalogue::PlainInputs all(unsigned reads = ~0U) const;
+  catalogue::PlainInputs all(unsigned reads = kAll) const;
 
   double angle_at(std::size_t k) const { return angle.empty() ? 0.0 : angle[k]; }
   double velocity_at(std::size_t k) const { return velocity.empty() ? 0.0 : velocity[k]; }

@@ -52,6 +52,11 @@ unsigned reads_of(const Terms& terms, const Term& term) {
   return term.entry->info->reads;
 }
 
+// The signals of a record that a term reads: what remembers the current reads the modelled one.
+unsigned current_for(const Term& term) {
+  return term.entry->has_state && !term.entry->definition ? RecordSignals::kModelledCurrent : 0;
+}
+
 // Calls add(balance, sum) for each balance that the term acts on, and weighs the sum by share(balance).
 template <class V, class Share, class Add>
 void add_by_shares(const Term& term, Share share, std::span<V> torque, Add add) {
@@ -94,7 +99,7 @@ bool RegressorEvaluator::change_inputs(const Terms& terms, const Term& term, con
   if (!any) return false;
   const auto constants = lifted<typename N::Parameter>(prepared_->constants);
   changed.reserve(r.inputs.size());
-  r.inputs.all().each_block([&](std::size_t, std::span<const effects::Inputs<Real>> block) {
+  r.inputs.all(RecordSignals::kAll | current_for(term)).each_block([&](std::size_t, auto block) {
     for (const auto& in : block) changed.push_back(catalogue::lifted<N>(in));
   });
   bool turned = false;
@@ -134,8 +139,17 @@ void RegressorEvaluator::add_torque(const Terms& terms, const Term& term,
     if (any)
       functions.torque(natural.data(), constants, to, changed, sum);
     else
-      functions.torque_of_plain(natural.data(), constants, to, r.inputs.all(term.entry->info->reads), sum);
+      functions.torque_of_plain(natural.data(), constants, to,
+                                r.inputs.all(term.entry->info->reads | current_for(term)), sum);
   });
+}
+
+std::vector<double> RegressorEvaluator::torque_along(const Terms& terms, std::size_t record) const {
+  const Record& r = prepared_->records[record];
+  std::vector<double> torque(r.inputs.size(), 0.0);
+  const auto all = values_of_all(terms);
+  for (const Term& term : terms) add_torque<Real>(terms, term, term.values, r, all, torque);
+  return torque;
 }
 
 namespace {

@@ -51,6 +51,9 @@ class RegressorEvaluator {
   // Torque of one term at its values, all parameters in.
   Eigen::VectorXd torque(const Terms& terms, std::size_t term) const;
 
+  // Torque of all terms at their values at each sample of a record, not filtered, N m.
+  std::vector<double> torque_along(const Terms& terms, std::size_t record) const;
+
   // What one unit at each point of a table adds, one column a point: linear interpolation between even points of a
   // signal (`low` to `high`, or over a turn for an angle), times the direction where `times_direction`. The signal is
   // as the shifts of `terms` leave it. Unfiltered columns cost a small part and serve to distinguish signals.

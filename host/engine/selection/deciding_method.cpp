@@ -150,12 +150,14 @@ Method deciding_method(const Resampling& resampling, const SearchedBalance& moto
 }
 
 bool stands_alone(const Resampling& resampling, const CandidateFit& likeliest) {
-  if (!resampling.found.empty() || !likeliest.held_out_ratio) return false;
-  const double fall = 1.0 - *likeliest.held_out_ratio * *likeliest.held_out_ratio;
+  if (!resampling.found.empty()) return false;
   // A lag is in the model that a delay is compared with, so that the likelihood counts only what is more than a lag.
-  const bool is_lag = is_delay_of_current(*likeliest.model.entry) && resampling.lag_s.value_or(0.0) < 0.0;
-  if (is_lag && resampling.lag_share >= kPolicy.most_share && fall >= kPolicy.most_share) return true;
-  return likeliest.gain.chi2_percent >= 100.0 * kPolicy.most_share && fall >= kPolicy.matters_share;
+  const bool is_lag = is_delay_of_current(*likeliest.model.entry) && resampling.lag_s.value_or(0.0) < 0.0 &&
+                      resampling.lag_share >= kPolicy.most_share;
+  const bool takes_off_most = likeliest.gain.chi2_percent >= 100.0 * kPolicy.most_share;
+  if (!likeliest.held_out_ratio) return is_lag && likeliest.gain.chi2_percent >= 100.0 * kPolicy.matters_share;
+  const double fall = 1.0 - *likeliest.held_out_ratio * *likeliest.held_out_ratio;
+  return (is_lag && fall >= kPolicy.most_share) || (takes_off_most && fall >= kPolicy.matters_share);
 }
 
 }  // namespace flexspline::selection

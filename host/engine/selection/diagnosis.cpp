@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "host/engine/comparison/noise_floor.hpp"
+#include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/balance_errors.hpp"
 #include "host/engine/selection/between_records.hpp"
@@ -219,6 +220,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   const auto base = estimation::identify(dataset, model, options.pipeline);
   result.warnings = base->warnings;
   result.parameter_trends = parameter_trends(*base);
+  estimation::take_modelled_current(base->prepared, base->terms);
   std::vector<SearchedBalance> all = search_balances(*base, dataset, options, result);
   const Decision decision = decide(all, *base, dataset, options, result);
   SearchedBalance& judged = *decision.judged;

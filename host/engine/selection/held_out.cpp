@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/policy.hpp"
 
@@ -16,6 +17,7 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
   if (experiments.empty()) return;
   prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
   prepared.output_signals = fitted.prepared.output_signals;
+  estimation::take_modelled_current(prepared, fitted.terms);
   data = std::make_unique<RegressionProblem>(prepared, balance);
   if (data->empty()) data.reset();
 }

@@ -6,6 +6,7 @@
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/effect_names.hpp"
+#include "host/engine/selection/named_by_resampling.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -76,6 +77,14 @@ bool may_replace(const Resampling& resampling, const CandidateFit& likeliest) {
   return !resampling.found_group(name_of(likeliest)).empty();
 }
 
+// Whether halves cannot judge the likeliest effect, which looks like the one that it makes needless.
+bool is_indistinct(const Resampling& resampling, const CandidateFit& likeliest, const NamedEffect& needless) {
+  const bool is_judged = support_of(resampling, likeliest) && resampling.is_visible(likeliest.model.entry->name());
+  const catalogue::Entry& entry = catalogue::get(needless.effect);
+  return !is_judged && (catalogue::names_contain(likeliest.model.entry->info->confused_with, entry.name()) ||
+                        catalogue::names_contain(entry.info->confused_with, likeliest.model.entry->name()));
+}
+
 }  // namespace
 
 JointNames eliminate_backward(const Resampling& resampling, const SearchedBalance& motor,
@@ -98,8 +107,17 @@ JointNames eliminate_backward(const Resampling& resampling, const SearchedBalanc
     joint.eliminated.push_back(std::move(*worst));
     names.erase(worst);
   }
-  if (other && (joint.eliminated.empty() || !may_replace(resampling, motor.candidates.front())))
+  if (other && (joint.eliminated.empty() || !may_replace(resampling, motor.candidates.front()))) {
+    const auto like_it = std::ranges::find_if(
+        joint.eliminated, [&](const NamedEffect& n) { return is_indistinct(resampling, motor.candidates.front(), n); });
+    if (like_it != joint.eliminated.end()) {
+      joint.names = {std::move(*like_it), *other};
+      joint.eliminated.erase(like_it);
+      joint.is_group = true;
+      return joint;
+    }
     std::erase(names, *other);
+  }
   joint.names = std::move(names);
   return joint;
 }

@@ -121,8 +121,8 @@ std::vector<NamedEffect> best_of_families(std::vector<NamedEffect> names, const 
   return names;
 }
 
-// Takes off names that gain nothing with the others in the model.
-void name_jointly(const SearchedBalance& motor, Diagnosis& result) {
+// Takes off names that gain nothing with the others in the model. Returns whether the rest is a group.
+bool name_jointly(const SearchedBalance& motor, Diagnosis& result) {
   JointNames joint = eliminate_backward(*result.resampling, motor, std::move(result.named));
   result.named = std::move(joint.names);
   std::erase_if(result.possible, [&](const PossibleEffect& p) {
@@ -134,6 +134,7 @@ void name_jointly(const SearchedBalance& motor, Diagnosis& result) {
     eliminated.why_not = "once the other effects are in the model, left-out data gain nothing by it";
     result.possible.push_back(std::move(eliminated));
   }
+  return joint.is_group;
 }
 
 // Puts the candidates of the names first, in their order; an effect that likelihood does not judge gets one.
@@ -182,7 +183,7 @@ void name_stable(SearchedBalance& chosen, Diagnosis& result) {
   bool is_group = ruled.is_group;
   result.named = best_of_families(ruled.names, chosen);
   result.possible = possible_effects(resampling, chosen, std::move(ruled));
-  if (!is_group) name_jointly(chosen, result);
+  if (!is_group) is_group = name_jointly(chosen, result);
   is_group = add_other_scale(chosen, result.named) || is_group;
   result.partial = std::ssize(resampling.found) > (is_group ? 1 : std::ssize(result.named));
   if (result.named.empty()) return;

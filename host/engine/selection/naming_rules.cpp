@@ -115,6 +115,17 @@ std::string is_not_confirmed(const FoundOnMotor& e) {
                                   : std::string(kNearNoise);
 }
 
+// Stick phases, and friction of the output behind an elastic gear, look like presliding in some halves.
+bool is_certain_presliding(const FoundOnMotor& e) {
+  return !catalogue::get(e.found.group.front().effect).is_presliding() || e.found.is_confirmed() ||
+         e.found.frequency >= kPolicy.certain_frequency;
+}
+std::string is_uncertain_presliding(const FoundOnMotor& e) {
+  return e.found.held_out_ratio ? how_held_out_falls(e.found)
+                                : fmt::format("without experiments that are held out {:.0f} of 100 are needed",
+                                              100.0 * kPolicy.certain_frequency);
+}
+
 bool agrees_with_likelihood(const FoundOnMotor& e) {
   return !is_contradicted(e.found, e.motor);
 }
@@ -169,6 +180,7 @@ constexpr auto kRules = std::to_array<NamingRule>({
     {"most subsamples, held-out error or likelihood", is_supported, is_not_supported},
     {"few records: held-out error or likelihood", holds_beyond_few_records, does_not_hold_beyond_few_records},
     {"second choice, or near the floor of few records: held-out error", is_confirmed_where_needed, is_not_confirmed},
+    {"presliding: held-out error, or nearly all subsamples", is_certain_presliding, is_uncertain_presliding},
     {"the likelihood of all data does not contradict", agrees_with_likelihood, is_against_likelihood},
     {"no effect that halves cannot choose is likelier", is_likeliest_of_confused, another_is_likelier},
     {"not behind a group that the data cannot distinguish", is_not_behind_group, is_behind_group},

@@ -59,4 +59,4 @@ file(READ ${report_folder}/page.css REPORT_STYLE)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS
   ${report_scripts} ${report_folder}/closed_loop.js ${report_folder}/page.html ${report_folder}/page.css)
 configure_file(${report_folder}/assets.cpp.in ${PROJECT_BINARY_DIR}/generated/host/output/report/assets.cpp @ONLY)
-target_sources(flexspline_host PRIVATE ${PROJECT_BINARY_DIR}/generated/host/output/report/assets.cpp)
+target_sources(flexspline_outer PRIVATE ${PROJECT_BINARY_DIR}/generated/host/output/report/assets.cpp)

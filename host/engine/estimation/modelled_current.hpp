@@ -1,0 +1,13 @@
+// The current that a model makes of the motion.
+#pragma once
+
+#include "host/engine/estimation/record.hpp"
+#include "host/engine/estimation/terms.hpp"
+
+namespace flexspline::estimation {
+
+// Gives the records the current that `terms`, with values, make of motion and load, A, for effects with a memory of the
+// current (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no current is measured.
+void take_modelled_current(PreparedData& prepared, const Terms& terms);
+
+}  // namespace flexspline::estimation
