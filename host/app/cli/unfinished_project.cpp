@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "host/app/project/column_names.hpp"
 #include "host/common/text/nearest.hpp"
 #include "host/input/data/findings.hpp"
 #include "host/physics/model/text.hpp"
@@ -82,6 +83,10 @@ std::string missing_maps(const project::Draft& draft) {
     if (!left.empty()) {
       theirs = text::nearest_first(ours, left).front();
       std::erase(left, theirs);
+      if (ours == "time_s" && project::counts_samples(theirs))
+        theirs += ":PERIOD ms";
+      else if (!project::unknown_unit_in_name(theirs).empty())
+        theirs += ":UNIT";
     }
     line += fmt::format(" --map {}", quoted(fmt::format("{}={}", ours, theirs)));
   }
@@ -134,7 +139,7 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   std::string line = as_given(request) + missing_maps(draft) + missing_counts(errors) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side SIDE";
   console.error(
-      fmt::format("{} holds what could be found; replace NAME, NUMBER, SIDE or a wrong name by the right "
+      fmt::format("{} holds what could be found; replace NAME, UNIT, PERIOD, NUMBER, SIDE or a wrong name by the right "
                   "one (NAME:UNIT states its unit), and continue with\n  {}",
                   file.string(), line));
 }

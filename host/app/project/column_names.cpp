@@ -32,6 +32,22 @@ std::vector<std::string> words_of(std::string_view name) {
   return words;
 }
 
+bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted);
+Kind kind_of_words(const std::vector<std::string>& words);
+
+// German writes as one word what English writes as two: "motorposition", "abtriebsmoment".
+void split_compounds(std::vector<std::string>& words) {
+  for (std::size_t k = 0; k < words.size(); ++k)
+    for (const std::string_view first : {"motor", "abtriebs", "abtrieb", "last", "gelenk"}) {
+      if (!words[k].starts_with(first) || words[k].size() == first.size()) continue;
+      const std::string rest = words[k].substr(first.size());
+      if (kind_of_words({rest}) == Kind::none) continue;
+      words[k] = first;
+      words.insert(words.begin() + static_cast<std::ptrdiff_t>(k) + 1, rest);
+      break;
+    }
+}
+
 bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted) {
   return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
     return std::find(wanted.begin(), wanted.end(), word) != wanted.end();
@@ -154,8 +170,8 @@ Kind kind_of_words(const std::vector<std::string>& words) {
   if (has_any(words, {"torque", "force", "tau", "moment", "effort", "trq", "tq", "drehmoment", "taum", "taul"}))
     return Kind::torque;
   if (has_any(words, {"current", "iq", "i", "cur", "amps", "strom", "im", "curr"})) return Kind::current;
-  if (has_any(words, {"position", "pos", "angle", "q", "theta", "phi", "enc", "encoder", "x", "actpos", "winkel", "qm",
-                      "ql", "thetam", "thetal", "phim", "phil", "alpha"}))
+  if (has_any(words, {"position", "pos", "angle", "q", "theta", "phi", "enc", "encoder", "x", "actpos", "winkel",
+                      "lage", "qm", "ql", "thetam", "thetal", "phim", "phil", "alpha"}))
     return Kind::position;
   return Kind::none;
 }
@@ -174,7 +190,8 @@ std::string usual_unit(const std::string& name, const std::vector<std::string>& 
 
 ColumnReading read_name(const std::string& name, const std::string& stated_unit,
                         const std::vector<std::string>& names) {
-  const std::vector<std::string> words = words_of(name);
+  std::vector<std::string> words = words_of(name);
+  split_compounds(words);
   ColumnReading r;
   r.unit = stated_unit.empty() ? unit_in_name(name) : stated_unit;
   std::string_view base = name;
@@ -211,8 +228,8 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
   if (r.kind == Kind::current && has_any(words, {"d"})) r.kind = Kind::none;
   r.set_point = has_any(words, {"ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "target",
                                 "desired", "des", "sp", "demand", "soll", "d"});
-  const bool link = has_any(words, {"output", "out", "joint", "link", "load", "arm", "flange", "ql", "thetal", "phil",
-                                    "wl", "dql", "taul"}) ||
+  const bool link = has_any(words, {"output", "out", "joint", "link", "load", "arm", "flange", "abtrieb", "abtriebs",
+                                    "last", "gelenk", "ql", "thetal", "phil", "wl", "dql", "taul"}) ||
                     (has_any(words, {"actual", "target"}) && has_any(words, {"q", "qd"}));
   const bool motor = has_any(words, {"motor", "mot", "rotor", "wg", "qm", "thetam", "phim", "wm", "dqm", "taum", "im"});
   r.side = motor ? Side::motor : link ? Side::link : side_by_letter(name, r.kind, names);
@@ -225,6 +242,23 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
   r.sensor =
       is_joint_torque(words) || has_any(words, {"sensor", "transducer", "measured", "gear", "gearbox", "flexspline"});
   return r;
+}
+
+bool counts_samples(const std::string& name) {
+  const std::vector<std::string> words = words_of(name);
+  return has_any(words, {"sample", "samples", "counter", "count", "index", "tick", "ticks", "nr", "cycle", "cycles"}) &&
+         kind_of_words(words) != Kind::time && unit_in_name(name).empty();
+}
+
+std::string unknown_unit_in_name(const std::string& name) {
+  if (!unit_in_name(name).empty()) return {};
+  if (name.ends_with("(%)")) return "%";
+  const std::size_t open = name.rfind('[');
+  if (open == std::string::npos || open == 0 || !name.ends_with(']')) return {};
+  const std::string inner = name.substr(open + 1, name.size() - open - 2);
+  const bool is_text = std::any_of(inner.begin(), inner.end(),
+                                   [](char c) { return c == '%' || std::isalpha(static_cast<unsigned char>(c)) != 0; });
+  return is_text ? inner : std::string();
 }
 
 std::string unit_in_name(std::string_view name) {

@@ -33,4 +33,10 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
 // The unit that a name ends with, in brackets or after an underscore: "speed [rpm]", "position_mm", "i_ma".
 std::string unit_in_name(std::string_view name);
 
+// What stands in square brackets at the end of a name and is no unit that is known, or "%"; empty: nothing.
+std::string unknown_unit_in_name(const std::string& name);
+
+// Whether a name counts samples, as "Sample" or "cycle_counter" does, and is no time.
+bool counts_samples(const std::string& name);
+
 }  // namespace flexspline::project

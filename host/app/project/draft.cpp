@@ -45,6 +45,28 @@ std::string units_of(const std::string& ours) {
 }
 
 // `names`: the columns of all files; `first` may say why it has none of a name.
+// A name that says that it is no SI value, without a unit that is known, needs one.
+void require_unit_in_name(const ColumnGuess& guess) {
+  const std::string map = fmt::format("--map {}={}", guess.ours, guess.theirs);
+  if (guess.ours == "time_s" && counts_samples(guess.theirs))
+    throw RequestError(
+        fmt::format("{0}: \"{1}\" counts samples; state their period as its unit, as in --map "
+                    "'{2}={1}:0.25 ms'",
+                    map, guess.theirs, guess.ours));
+  const std::string unit = unknown_unit_in_name(guess.theirs);
+  if (unit == "%")
+    throw RequestError(
+        fmt::format("{0}: it is a ratio to a rated value; state the size of 1 % as its unit, as in "
+                    "--map '{1}={2}:{3}' where 100 % are {4}",
+                    map, guess.ours, guess.theirs, guess.ours == "current_a" ? "0.05 A" : "0.125 N*m",
+                    guess.ours == "current_a" ? "5 A" : "12.5 N*m"));
+  if (!unit.empty())
+    throw RequestError(
+        fmt::format("{}: the unit \"{}\" in its name is not known; state one, as in --map '{}={}:UNIT'; "
+                    "those of {} are {}, also with a number before them",
+                    map, unit, guess.ours, guess.theirs, guess.ours, units_of(guess.ours)));
+}
+
 ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names, const data::Recording& first) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
@@ -77,6 +99,7 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
                                                : fmt::format("\"{}\" {}", guess.theirs, why),
                                    output::listed(text::nearest_first(guess.theirs, names))));
   }
+  if (guess.unit.empty()) require_unit_in_name(guess);
   return guess;
 }
 

@@ -1,11 +1,14 @@
 #include "host/engine/estimation/identify.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "host/engine/estimation/least_squares.hpp"
+#include "host/engine/estimation/regressor_evaluator.hpp"
 #include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 
@@ -322,6 +325,21 @@ void store_tables(Identification& result) {
   }
 }
 
+// Why a balance has no equations in these data.
+std::string why_not_formed(const Identification& result, Balance balance) {
+  const RegressorEvaluator of_records(result.prepared, balance);
+  std::vector<std::string> left_out;
+  for (const auto& [record, text] : of_records.left_out()) left_out.push_back(text);
+  if (!left_out.empty())
+    return fmt::format("too few samples of its balance ({}) are left: {}", catalogue::balance_name(balance),
+                       fmt::join(left_out, ", "));
+  constexpr std::array<std::string_view, 3> kNeeds = {"the effort and the motion of the motor",
+                                                      "a torque, and the motion of motor and output",
+                                                      "a torque, and a motion of an output that is free"};
+  return fmt::format("no record of role fit has what its balance ({}) needs: {}", catalogue::balance_name(balance),
+                     kNeeds[index(balance)]);
+}
+
 }  // namespace
 
 void compute_estimates(Identification& result) {
@@ -343,8 +361,8 @@ void compute_estimates(Identification& result) {
   }
   for (std::size_t t = 0; t < result.terms.size(); ++t)
     if (!touched[t])
-      result.warnings.push_back(fmt::format(
-          "{}: its balance cannot be formed from these data; its parameters are left as they are", result.terms[t].id));
+      result.warnings.push_back(fmt::format("{}: {}; its parameters are left as they are", result.terms[t].id,
+                                            why_not_formed(result, result.terms[t].entry->info->balance)));
   for (const Term& term : result.terms) store_grids(result.model, term, axis);
   store_tables(result);
   derive_directions(alone, result.estimates, result.derived);

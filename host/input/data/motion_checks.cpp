@@ -24,6 +24,7 @@ std::string cause_of(double factor, const DriveFacts& drive) {
   if (near(size, 60.0 / kTurn_rad)) return "the velocity is in rpm" + sign;
   if (near(size, 360.0 / kTurn_rad)) return "the velocity is in deg/s" + sign;
   if (near(size, 1.0 / kTurn_rad)) return "the velocity is in turns per second, or the position in turns" + sign;
+  if (near(size, kTurn_rad)) return "the position is in turns" + sign;
   if (near(size, kTurn_rad / 360.0)) return "the position is in degrees" + sign;
   if (near(size, 360e3 / kTurn_rad)) return "the velocity is in mdeg/s" + sign;
   if (near(size, kTurn_rad / 360e3)) return "the position is in millidegrees" + sign;
@@ -62,8 +63,9 @@ void check_velocity(const Experiment& experiment, Column position, Column veloci
                fmt::format("in \"{}\" it is {:.4g} times the derivative of {}{}{}", experiment.name, ratio.factor,
                            column_name(position), cause.empty() ? "" : ": ", cause),
                fmt::format("give unit or scale of the wrong one under [columns.{}] or [columns.{}] in dataset.toml, or "
-                           "leave one out; --tolerate velocity_position_mismatch uses it",
-                           column_name(velocity), column_name(position)));
+                           "leave one out{}",
+                           column_name(velocity), column_name(position),
+                           cause.empty() ? "; --tolerate velocity_position_mismatch uses it" : ""));
 }
 
 // One column that shows whether the drive moves.
