@@ -127,8 +127,21 @@ ParameterRange torsion_range(const RegressionProblem& data, const effects::Param
   }
 }
 
+// Speeds of the samples that move: where an axis dwells, its speed is what the filter leaves of noise.
+std::vector<double> speeds(const RegressionProblem& data) {
+  std::vector<double> moving;
+  for (const RowRange& range : data.records()) {
+    const Record& r = data.prepared().records[range.record];
+    for (const std::size_t k : r.rows[index(data.balance())].samples)
+      if (const double speed = std::abs(r.inputs.velocity_at(k));
+          !r.at_rest && speed > r.velocity_noise[index(Balance::motor)])
+        moving.push_back(speed);
+  }
+  return moving;
+}
+
 ParameterRange velocity_range(const RegressionProblem& data, const effects::ParameterInfo& info) {
-  const std::vector<double> all = magnitudes(data, [](const auto& in) { return in.velocity; });
+  const std::vector<double> all = speeds(data);
   // The unmasked samples must cover the term: its width is at least the slowest hundredth of the samples.
   if (info.limit == Limit::velocity)
     return scale_between(info, std::max(quantile(all, 0.01), kNegligible), 0.25 * quantile(all, 0.95));

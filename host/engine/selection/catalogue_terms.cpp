@@ -32,6 +32,8 @@ struct Extension {
   Terms terms;
   double highest_hz = 0.0;    // of its order
   std::size_t nonlinear = 0;  // parameters that are searched over
+  std::size_t searched = 0;   // place of that parameter, where there is one, and its range
+  estimation::ParameterRange range = {};
 
   const estimation::Term& added() const { return terms.back(); }
   // No drive has such an order. It competes with the others and is never named.
@@ -195,7 +197,8 @@ void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedC
 }
 
 // An effect at each value of its nonlinear parameter, if it has one; nothing where it has several, or no column.
-void append_values(Extension e, const RegressionProblem& data, std::vector<Extension>& all) {
+void append_values(Extension e, const RegressionProblem& data, const SelectionPolicy& policy,
+                   std::vector<Extension>& all) {
   if (e.parameters().empty()) return;
   if (e.modulates()) return all.push_back(std::move(e));
   estimation::Term& added = e.terms.back();
@@ -205,9 +208,10 @@ void append_values(Extension e, const RegressionProblem& data, std::vector<Exten
   if (free_nonlinear.size() > 1) return;
   if (free_nonlinear.empty()) return all.push_back(std::move(e));
   e.nonlinear = 1;
-  const estimation::ParameterRange range = estimation::parameter_range(data, added, free_nonlinear[0]);
-  for (const double value : estimation::parameter_grid(range, kGridPoints)) {
-    added.values[free_nonlinear[0]] = value;
+  e.searched = free_nonlinear[0];
+  e.range = estimation::parameter_range(data, added, e.searched);
+  for (const double value : estimation::parameter_grid(e.range, policy.grid_points)) {
+    added.values[e.searched] = value;
     all.push_back(e);
   }
 }
@@ -231,7 +235,7 @@ std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& 
         continue;
       }
       leave_out_unseen_direction(data, e.terms);
-      append_values(std::move(e), data, all);
+      append_values(std::move(e), data, builder.policy, all);
     }
   }
   return all;
@@ -251,28 +255,87 @@ Eigen::MatrixXd basis_of_model(const TableBuilder& builder, const Eigen::VectorX
   return algebra::PivotedQr(all, 1e-7).span();
 }
 
+// What the model leaves of all data that are fitted.
+class LeftByModel {
+ public:
+  explicit LeftByModel(const TableBuilder& builder) {
+    const RegressorTable& table = builder.table;
+    fitted_on_ = Eigen::VectorXd::Zero(table.target.size());
+    for (const Run& run : table.runs)
+      if (table.held_out[run.record] == 0) fitted_on_.segment(run.first, run.last - run.first).setOnes();
+    basis_ = basis_of_model(builder, fitted_on_);
+    residual_ = orthogonal(table.target);
+  }
+  // The squares that columns take off.
+  double taken_by(const Eigen::MatrixXd& columns) const {
+    const Eigen::MatrixXd own = orthogonal(columns);
+    return (own * algebra::PivotedQr(own, 1e-7).solve(residual_)).squaredNorm();
+  }
+
+ private:
+  Eigen::MatrixXd orthogonal(Eigen::MatrixXd x) const {
+    x = fitted_on_.asDiagonal() * x;
+    return x - basis_ * (basis_.transpose() * x);
+  }
+
+  Eigen::VectorXd fitted_on_, residual_;
+  Eigen::MatrixXd basis_;
+};
+
+// The two highest of the local maxima, by their places.
+std::vector<std::size_t> highest_peaks(const std::vector<double>& values) {
+  std::vector<std::size_t> peaks;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if ((k == 0 || values[k] >= values[k - 1]) && (k + 1 == values.size() || values[k] > values[k + 1]))
+      peaks.push_back(k);
+  std::ranges::sort(peaks, [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
+  peaks.resize(std::min<std::size_t>(peaks.size(), 2));
+  return peaks;
+}
+
+// Adds values of nonlinear parameters between the neighbours of those that take off most: of two, as a very narrow law
+// may follow a few samples about standstill.
+void add_values_near_best(const TableBuilder& builder, const LeftByModel& left, std::vector<Extension>& extensions,
+                          std::vector<Eigen::MatrixXd>& columns) {
+  const std::size_t points = builder.policy.grid_points;
+  std::vector<Extension> finer;
+  for (std::size_t first = 0; first < extensions.size();) {
+    const Extension& e = extensions[first];
+    if (e.nonlinear != 1) {
+      ++first;
+      continue;
+    }
+    std::vector<double> taken;
+    for (std::size_t k = 0; k < points; ++k) taken.push_back(left.taken_by(columns[first + k]));
+    const auto at = [&](double place) { return e.range.at(std::clamp(place / static_cast<double>(points), 0.0, 1.0)); };
+    for (const std::size_t peak : highest_peaks(taken)) {
+      const auto place = static_cast<double>(peak);
+      const estimation::ParameterRange near{at(place - 0.5), at(place + 1.5), e.range.logarithmic};
+      for (const double value : estimation::parameter_grid(near, builder.policy.finer_grid_points)) {
+        finer.push_back(e);
+        finer.back().terms.back().values[e.searched] = value;
+      }
+    }
+    first += points;
+  }
+  std::vector<Eigen::MatrixXd> more = columns_of_all(finer, builder.sign);
+  for (std::size_t k = 0; k < finer.size(); ++k) {
+    extensions.push_back(std::move(finer[k]));
+    columns.push_back(std::move(more[k]));
+  }
+}
+
 // Which extensions compete: of waves over the angle, of each effect and of placebos likewise, the orders that take most
 // off what the model leaves of all data. The others would cost most of the time.
 std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& extensions,
-                                             const std::vector<Eigen::MatrixXd>& columns, const TableBuilder& builder) {
-  const RegressorTable& table = builder.table;
-  Eigen::VectorXd fitted_on = Eigen::VectorXd::Zero(table.target.size());
-  for (const Run& run : table.runs)
-    if (table.held_out[run.record] == 0) fitted_on.segment(run.first, run.last - run.first).setOnes();
-  const Eigen::MatrixXd basis = basis_of_model(builder, fitted_on);
-  const auto orthogonal = [&](Eigen::MatrixXd x) -> Eigen::MatrixXd {
-    x = fitted_on.asDiagonal() * x;
-    return x - basis * (basis.transpose() * x);
-  };
-  const Eigen::VectorXd residual = orthogonal(table.target);
+                                             const std::vector<Eigen::MatrixXd>& columns, const TableBuilder& builder,
+                                             const LeftByModel& left) {
   std::vector<std::uint8_t> kept(extensions.size(), 1);
   std::map<std::pair<const catalogue::Entry*, bool>, std::vector<std::pair<double, std::size_t>>> waves;
   for (std::size_t i = 0; i < extensions.size(); ++i) {
     const Extension& e = extensions[i];
     if (!e.order) continue;
-    const Eigen::MatrixXd own = orthogonal(columns[i]);
-    const double taken = (own * algebra::PivotedQr(own, 1e-7).solve(residual)).squaredNorm();
-    waves[{&e.entry, e.is_placebo()}].emplace_back(-taken, i);
+    waves[{&e.entry, e.is_placebo()}].emplace_back(-left.taken_by(columns[i]), i);
   }
   for (auto& [effect, list] : waves) {
     std::sort(list.begin(), list.end());
@@ -296,9 +359,11 @@ void exclude_phase_errors(RegressorTable& table, std::size_t first) {
 }  // namespace
 
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
-  const std::vector<Extension> extensions = extensions_of(builder, motion);
+  std::vector<Extension> extensions = extensions_of(builder, motion);
   std::vector<Eigen::MatrixXd> sign = columns_of_all(extensions, builder.sign);
-  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, sign, builder);
+  const LeftByModel left(builder);
+  add_values_near_best(builder, left, extensions, sign);
+  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, sign, builder, left);
   std::vector<Extension> directed;
   for (std::size_t i = 0; i < extensions.size(); ++i)
     if (builder.presliding && kept[i] != 0 && extensions[i].reads_direction()) directed.push_back(extensions[i]);

@@ -27,6 +27,11 @@ struct SelectionPolicy {
   std::size_t pairs = 48;                   // for each bandwidth and mask
   std::size_t fewest_records_to_split = 4;  // from so many on every second pair halves the records, not their blocks
   std::size_t most_steps = 4;
+  // Values of a nonlinear parameter that halves choose from: over its range, and between the neighbours of the two
+  // that take off most of all data. A Gaussian law between two of a coarse grid takes off two thirds of its squares
+  // only, less than a curve of no catalogue (logs of simulated machines whose speeds span two decades).
+  std::size_t grid_points = 8;
+  std::size_t finer_grid_points = 6;
   double named_frequency = 0.6;       // Meinshausen and Buehlmann 2010: 0.6 to 0.9
   double min_frequency_of_all = 0.5;  // with abstaining subsamples counted as not choosing: the least that Meinshausen
                                       // and Buehlmann's bound of false selections allows
