@@ -60,8 +60,7 @@ data::Dataset load(const DataInputs& inputs, Console& console) {
   console.progress("reading the measurements");
   data::Dataset dataset = data::load(inputs.data, {inputs.tolerate, false});
   if (!inputs.holdout.empty()) hold_out(dataset, data::load(inputs.holdout, {inputs.tolerate, true}));
-  for (const data::Finding& finding : dataset.findings)
-    if (finding.severity == data::Severity::warning) console.warn(finding.text());
+  for (const std::string& text : data::warning_texts(dataset.findings)) console.warn(text);
   return dataset;
 }
 

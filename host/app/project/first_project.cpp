@@ -19,8 +19,7 @@ FirstProject first_project(Draft& draft, const Request& request) {
   if (!draft.open_question.empty()) throw RequestError(draft.open_question);
   FirstProject project;
   project.dataset = load_draft(draft, request);
-  for (const data::Finding& finding : project.dataset.findings)
-    if (finding.severity == data::Severity::warning) project.warnings.push_back(finding.text());
+  for (std::string& text : data::warning_texts(project.dataset.findings)) project.warnings.push_back(std::move(text));
   take_facts_of_values(draft, project.dataset);
   for (const std::string& doubt : implausible_sides(draft, project.dataset)) project.warnings.push_back(doubt);
   project.base = base_model(project.dataset, name_of(request.out));

@@ -1,6 +1,10 @@
 #include "host/input/data/finding.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
 
 namespace flexspline::data {
 namespace {
@@ -28,5 +32,31 @@ std::string Finding::text() const {
 
 DataError::DataError(std::vector<Finding> findings)
     : std::runtime_error(joined(findings)), findings_(std::move(findings)) {}
+
+std::vector<std::string> warning_texts(const std::vector<Finding>& findings) {
+  constexpr std::size_t kFewestToJoin = 3;
+  std::vector<std::string> texts;
+  const auto is_alike = [](const Finding& a, const Finding& b) {
+    return a.severity == b.severity && a.kind == b.kind && a.column == b.column && a.remedy == b.remedy;
+  };
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    const Finding& finding = findings[i];
+    if (finding.severity != Severity::warning) continue;
+    std::size_t before = 0;
+    std::vector<std::string> others;
+    for (std::size_t j = 0; j < findings.size(); ++j) {
+      if (j == i || !is_alike(findings[j], finding) || findings[j].file == finding.file) continue;
+      if (j < i) ++before;
+      const std::string name = std::filesystem::path(findings[j].file).filename().string();
+      if (std::find(others.begin(), others.end(), name) == others.end()) others.push_back(name);
+    }
+    if (others.size() + 1 < kFewestToJoin)
+      texts.push_back(finding.text());
+    else if (before == 0)
+      texts.push_back(fmt::format("{} (likewise in {} more files: {}; flexspline check lists each)", finding.text(),
+                                  others.size(), fmt::join(others, ", ")));
+  }
+  return texts;
+}
 
 }  // namespace flexspline::data

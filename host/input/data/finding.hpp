@@ -24,6 +24,10 @@ struct Finding {
   std::string text() const;
 };
 
+// The warnings as texts. Of what three or more files share, the first text stands for all and names the other files:
+// `flexspline check` lists each.
+std::vector<std::string> warning_texts(const std::vector<Finding>& findings);
+
 // Unusable measurements: exit 2.
 class DataError : public std::runtime_error {
  public:
