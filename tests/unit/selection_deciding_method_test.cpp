@@ -56,6 +56,17 @@ TEST(DecidingMethod, IsResamplingWhereLikelihoodNamesNothing) {
   EXPECT_EQ(deciding_method(halves_that_chose("quadratic_drag", 0.0), motor), Method::resampling);
 }
 
+// 100 samples of which each leaves an error of 1.2 where they are fitted.
+TEST(DecidingMethod, IsResamplingWhereTheModelDoesNotHoldOnDataLeftOut) {
+  SearchedBalance motor = motor_with("quadratic_drag");
+  motor.candidates.front().fit.residual.setConstant(1.2);
+  const Resampling chosen = halves_that_chose("quadratic_drag", 0.9);
+  motor.candidates.front().fit.left_out = {{100.0, 100.0 * 1.44 * 2.9}};
+  EXPECT_EQ(deciding_method(chosen, motor), Method::likelihood);
+  motor.candidates.front().fit.left_out = {{100.0, 100.0 * 1.44 * 3.1}};
+  EXPECT_EQ(deciding_method(chosen, motor), Method::resampling);
+}
+
 TEST(DecidingMethod, IsResamplingForPreslidingAsLikelihoodLeavesOutReversals) {
   EXPECT_EQ(deciding_method(halves_that_chose("dahl_friction", 1.0), motor_with("dahl_friction")), Method::resampling);
 }

@@ -60,6 +60,13 @@ bool likelihood_names_nothing(const BothMethods& b) {
   return !b.motor.names_one();
 }
 
+// Even with it the model does not hold on data left out of the fit: what it takes off there is extrapolation.
+bool likeliest_does_not_carry_over(const BothMethods& b) {
+  const CrossValidatedFit& fit = likeliest(b).fit;
+  return std::pow(fit.rmse_cv_fixed_effects(), 2) >
+         kPolicy.max_validation_to_training * std::pow(fit.rmse_fixed_effects(), 2);
+}
+
 // The model with the likeliest effect leaves known noise: as large as a noise floor that is not from a fit, with no
 // more correlation than the filter causes.
 bool likeliest_reaches_floor(const BothMethods& b) {
@@ -126,6 +133,7 @@ constexpr auto kRules = std::to_array<DecidingRule>({
     {"nothing to resample", is_without_samples, Method::likelihood},
     {"too few samples for halves", has_too_few_samples, Method::resampling},
     {"likelihood names nothing", likelihood_names_nothing, Method::resampling},
+    {"the model does not hold on data left out", likeliest_does_not_carry_over, Method::resampling},
     {"the likeliest effect reaches the noise floor", likeliest_reaches_floor, Method::likelihood},
     {"the likeliest effect is presliding", likeliest_is_presliding, Method::resampling},
     {"halves cannot choose it, and it explains nearly all", unseen_by_halves_takes_off_nearly_all, Method::likelihood},
