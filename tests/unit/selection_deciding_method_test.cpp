@@ -28,6 +28,13 @@ SearchedBalance motor_with(std::string_view effect) {
   return motor;
 }
 
+// The same, but with its candidate the error is 1.2: hardly above the noise.
+SearchedBalance motor_near_noise_with(std::string_view effect) {
+  SearchedBalance motor = motor_with(effect);
+  motor.candidates.front().fit.residual.setConstant(1.2);
+  return motor;
+}
+
 Resampling halves_that_chose(std::string_view effect, double frequency) {
   Resampling resampling;
   resampling.subsamples = 100.0;
@@ -58,8 +65,7 @@ TEST(DecidingMethod, IsResamplingWhereLikelihoodNamesNothing) {
 
 // 100 samples of which each leaves an error of 1.2 where they are fitted.
 TEST(DecidingMethod, IsResamplingWhereTheModelDoesNotHoldOnDataLeftOut) {
-  SearchedBalance motor = motor_with("quadratic_drag");
-  motor.candidates.front().fit.residual.setConstant(1.2);
+  SearchedBalance motor = motor_near_noise_with("quadratic_drag");
   const Resampling chosen = halves_that_chose("quadratic_drag", 0.9);
   motor.candidates.front().fit.left_out = {{100.0, 100.0 * 1.44 * 2.9}};
   EXPECT_EQ(deciding_method(chosen, motor), Method::likelihood);
@@ -81,8 +87,7 @@ TEST(DecidingMethod, IsLikelihoodForWhatHalvesCannotChooseAndExplainsNearlyAll) 
 }
 
 TEST(DecidingMethod, IsResamplingWhereHalvesFoundOtherEffectsOnly) {
-  SearchedBalance motor = motor_with("quadratic_drag");
-  motor.candidates.front().fit.residual.setConstant(1.2);
+  SearchedBalance motor = motor_near_noise_with("quadratic_drag");
   Resampling others = halves_that_chose("quadratic_drag", 0.9);
   EXPECT_EQ(deciding_method(others, motor), Method::likelihood);
   others.found = {found("coulomb_asymmetry")};
@@ -90,8 +95,7 @@ TEST(DecidingMethod, IsResamplingWhereHalvesFoundOtherEffectsOnly) {
 }
 
 TEST(DecidingMethod, IsResamplingWhereHalvesDidNotChooseTheLikeliestUnlessMostAbstained) {
-  SearchedBalance motor = motor_with("quadratic_drag");
-  motor.candidates.front().fit.residual.setConstant(1.2);
+  SearchedBalance motor = motor_near_noise_with("quadratic_drag");
   Resampling few = halves_that_chose("quadratic_drag", kPolicy.named_frequency - 0.1);
   EXPECT_EQ(deciding_method(few, motor), Method::resampling);
   few.abstained = 100.0 * kPolicy.most_abstaining + 1.0;
@@ -99,8 +103,7 @@ TEST(DecidingMethod, IsResamplingWhereHalvesDidNotChooseTheLikeliestUnlessMostAb
 }
 
 TEST(DecidingMethod, IsResamplingWhereANoisyTorqueMayBeExplained) {
-  SearchedBalance motor = motor_with("load_dependent_friction");
-  motor.candidates.front().fit.residual.setConstant(1.2);
+  SearchedBalance motor = motor_near_noise_with("load_dependent_friction");
   Resampling resampling = halves_that_chose("load_dependent_friction", 0.9);
   EXPECT_EQ(deciding_method(resampling, motor), Method::likelihood);
   resampling.torque_has_noise = true;

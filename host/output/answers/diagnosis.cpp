@@ -78,7 +78,7 @@ std::string candidate_table(const Diagnosis& d) {
 
 const Candidate* candidate_of(const Diagnosis& d, const selection::NamedEffect& named) {
   for (const Candidate& c : d.candidates)
-    if (c.effect == named.effect && c.order == named.order) return &c;
+    if (selection::NamedEffect{c.effect, c.order} == named) return &c;
   return nullptr;
 }
 
@@ -159,11 +159,6 @@ std::string stated_setting_text(const selection::StatedSetting& stated) {
       "The verdict is made at the cut-off and the mask that the data give. The stated ones alone would name {}: a name "
       "that depends on them is not certain.",
       names.empty() ? "nothing" : names);
-}
-
-bool has_same_names(const std::vector<selection::NamedEffect>& a, const std::vector<selection::NamedEffect>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const auto& x, const auto& y) { return x.effect == y.effect && x.order == y.order; });
 }
 
 std::string law_in_range_text(const selection::LawInRange& law) {
@@ -277,8 +272,7 @@ void print_possible(Console& console, const std::vector<selection::PossibleEffec
 // Candidates that are one with an effect of the model on these data.
 void print_confounded_with_model(Console& console, const Diagnosis& d) {
   for (const Candidate& c : d.candidates) {
-    const bool is_named = std::any_of(d.named.begin(), d.named.end(),
-                                      [&](const auto& n) { return n.effect == c.effect && n.order == c.order; });
+    const bool is_named = std::ranges::find(d.named, selection::NamedEffect{c.effect, c.order}) != d.named.end();
     const catalogue::Entry* entry = catalogue::find(c.effect);
     if (is_named || c.confounding_reasons.empty() || entry == nullptr) continue;
     console.line(wrapped(fmt::format("{} cannot be distinguished from {} of the model here. They are separated by {}.",
@@ -297,7 +291,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));
-  if (d.at_stated_setting && !has_same_names(d.at_stated_setting->named, d.named))
+  if (d.at_stated_setting && d.at_stated_setting->named != d.named)
     console.line(wrapped(stated_setting_text(*d.at_stated_setting)));
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
