@@ -20,12 +20,14 @@ SearchedBalance balance(std::string_view effect, double score, double percent) {
   return motor;
 }
 
-// All subsamples chose it.
-bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio, double percent = 10.0) {
+// All subsamples chose it, or could not distinguish it from `other`.
+bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio, double percent = 10.0,
+               std::string_view other = {}) {
   Resampling resampling;
   resampling.subsamples = 100.0;
   Resampling::FoundTerm found;
   found.group = {{std::string(effect), std::nullopt}};
+  if (!other.empty()) found.group.push_back({std::string(other), 1.0});
   found.frequency = 1.0;
   found.held_out_ratio = held_out_ratio;
   return may_be_stated(resampling, found, balance(effect, score, percent));
@@ -50,6 +52,13 @@ TEST(OutputAngle, OrHalfOfTheSquaredHeldOutError) {
 TEST(OutputAngle, OtherEffectsAreStatedByTheirFrequencyAlone) {
   EXPECT_TRUE(is_stated("quadratic_drag", 0.0, std::nullopt));
   EXPECT_TRUE(is_stated("torque_ripple", 0.0, 0.99));
+}
+
+// Of a drive without a gear a ripple of the motor's turn is the same wave.
+TEST(OutputAngle, WhatCannotBeDistinguishedFromAnEffectOfItNeedsAsMuch) {
+  EXPECT_FALSE(is_stated("gravity", 0.0, 0.82, 10.0, "torque_ripple"));
+  EXPECT_FALSE(is_stated("torque_ripple", 0.0, 0.82, 10.0, "gravity"));
+  EXPECT_TRUE(is_stated("gravity", 0.0, 0.70, 10.0, "torque_ripple"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Columns of a table: what one unit at each of its points adds.
+// Columns over a signal: what one unit at each point of a table adds, and waves of an angle.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -28,6 +28,13 @@ double signal_of(const effects::Inputs<Real>& in, effects::Variable variable, do
   if (variable == effects::Variable::motor_angle) return within_turn(in.angle * turn_angle_scale);
   if (variable == effects::Variable::output_angle) return within_turn(in.output_angle);
   return effects::signal_of<Real>(variable, in);
+}
+
+// What effects::direction_on reads.
+unsigned direction_reads(Balance balance) {
+  return balance == Balance::motor          ? effects::kDirection
+         : balance == Balance::transmission ? effects::kTorsion
+                                            : effects::kOutputMotion;
 }
 
 // Between which points of the table a sample is, and how much it adds there.
@@ -84,8 +91,9 @@ Eigen::MatrixXd RegressorEvaluator::point_columns(const Terms& terms, const Poin
     if (weight == 0.0) continue;
     std::vector<effects::Inputs<Real>> changed;
     const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);
-    const std::vector<Place> places = places_of(any ? catalogue::PlainInputs(changed) : r.inputs.all(), points, weight,
-                                                prepared_->constants.turn_angle_scale);
+    const unsigned reads = reader.info.reads | (points.times_direction ? direction_reads(points.balance) : 0U);
+    const std::vector<Place> places = places_of(any ? catalogue::PlainInputs(changed) : r.inputs.all(reads), points,
+                                                weight, prepared_->constants.turn_angle_scale);
     const auto& samples = r.rows[index(balance_)].samples;
     if (!filtered) {
       for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -123,6 +131,32 @@ Eigen::MatrixXd RegressorEvaluator::point_columns(const Terms& terms, const Poin
   return columns;
 }
 
+Eigen::MatrixXd RegressorEvaluator::wave_columns(const Terms& terms, effects::Variable angle, Balance of,
+                                                 int multiple) const {
+  const Reader reader(angle);
+  const auto all = values_of_all(terms);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), 2);
+  for (const RowRange& range : ranges_) {
+    const Record& r = prepared_->records[range.record];
+    const double weight = r.at_rest ? 0.0 : share(r, of);
+    if (weight == 0.0) continue;
+    std::vector<effects::Inputs<Real>> changed;
+    const bool any = change_inputs<Real>(terms, reader.term, r, all, changed);
+    Eigen::MatrixXd signals(static_cast<Eigen::Index>(r.inputs.size()), 2);
+    const catalogue::PlainInputs inputs = any ? catalogue::PlainInputs(changed) : r.inputs.all(reader.info.reads);
+    inputs.each_block([&](std::size_t first, std::span<const effects::Inputs<Real>> block) {
+      for (std::size_t k = 0; k < block.size(); ++k) {
+        const double x = multiple * signal_of(block[k], angle, prepared_->constants.turn_angle_scale);
+        signals.row(static_cast<Eigen::Index>(first + k)) << weight * std::cos(x), weight * std::sin(x);
+      }
+    });
+    filter(range, signals);
+    for (Eigen::Index j = 0; j < 2; ++j)
+      take_rows(range, signals.col(j).data(), columns.col(j).segment(range.first, range.size()));
+  }
+  return columns;
+}
+
 Eigen::VectorXd RegressorEvaluator::signal_at_rows(const Terms& terms, effects::Variable variable) const {
   const Reader reader(variable);
   const auto all = values_of_all(terms);
@@ -134,7 +168,8 @@ Eigen::VectorXd RegressorEvaluator::signal_at_rows(const Terms& terms, effects::
     const auto& samples = r.rows[index(balance_)].samples;
     for (std::size_t k = 0; k < samples.size(); ++k)
       signal[range.first + static_cast<Eigen::Index>(k)] =
-          signal_of(any ? changed[samples[k]] : r.inputs[samples[k]], variable, prepared_->constants.turn_angle_scale);
+          signal_of(any ? changed[samples[k]] : r.inputs.at(samples[k], reader.info.reads), variable,
+                    prepared_->constants.turn_angle_scale);
   }
   return signal;
 }

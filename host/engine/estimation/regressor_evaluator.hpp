@@ -66,6 +66,8 @@ class RegressorEvaluator {
     std::size_t count = 2;
   };
   Eigen::MatrixXd point_columns(const Terms& terms, const Points& points, bool filtered = true) const;
+  // Cosine and sine of a whole multiple of an angle, two columns, filtered: N m on `of`, by its share here.
+  Eigen::MatrixXd wave_columns(const Terms& terms, effects::Variable angle, Balance of, int multiple) const;
   // Values of a signal at the samples, as the shifts of `terms` leave it; angles within a turn.
   Eigen::VectorXd signal_at_rows(const Terms& terms, effects::Variable variable) const;
 

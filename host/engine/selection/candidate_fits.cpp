@@ -374,9 +374,19 @@ bool is_another_law(const CandidateFit& candidate, const RegressionProblem& data
   return false;
 }
 
-std::optional<CandidateFit> backward_elimination(const BalanceSearch& search, const CandidateFit& first) {
+std::optional<CandidateFit> backward_elimination(const BalanceSearch& search,
+                                                 const std::vector<CandidateFit>& candidates) {
+  const CandidateFit& first = candidates.front();
   BalanceSearch next{search.data, search.keep, first.fit};
-  std::vector<CandidateFit> more = rank_candidates(next);
+  // What makes the first one needless explains as much as that one does; half of it alone, as its nonlinear parameters
+  // may be found better with the first one in the model.
+  constexpr double kLeastAlone = 0.5;
+  std::vector<CandidateFit> more = rank_candidates(next, [&](const CandidateModel& model) {
+    return std::ranges::none_of(candidates, [&](const CandidateFit& alone) {
+      return alone.model.entry == model.entry && alone.model.order == model.order &&
+             alone.gain.chi2_percent < kLeastAlone * first.gain.chi2_percent;
+    });
+  });
   if (more.empty() || !passes(more.front())) return std::nullopt;
   const CandidateFit& second = more.front();
   // Only an effect that may be added to the base model alone can replace the first one.

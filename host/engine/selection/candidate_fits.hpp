@@ -30,6 +30,7 @@ struct CandidateFit {
   bool leads = false;  // has a higher score than a simpler one that comes first, but not significantly
   bool order_is_not_identifiable =
       false;  // not admissible for this reason only: it has the usual order, which is the best of those tried
+  bool has_uncertain_period = false;  // is a wave of the output's angle, and the data do not show its period
 
   double score() const { return gain.score + other_balance_score; }
 };
@@ -51,8 +52,9 @@ std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
 void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 // One more forward step, then backward elimination: an effect that was named because it resembles the true one is
-// dropped once the true one is in the model. Returns the candidate to name instead of `first`, or nothing.
-std::optional<CandidateFit> backward_elimination(const BalanceSearch& search, const CandidateFit& first);
+// dropped once the true one is in the model. Returns the candidate to name instead of the first of all, or nothing.
+std::optional<CandidateFit> backward_elimination(const BalanceSearch& search,
+                                                 const std::vector<CandidateFit>& candidates);
 
 // Whether all amplitudes of a law whose description explains that case came out negative.
 bool is_negative(const CandidateFit& candidate);

@@ -71,8 +71,9 @@ bool is_wave(const catalogue::Entry& entry) {
 
 DetectionLimit::DetectionLimit(const BalanceSearch& search)
     : search_(&search),
+      coarse_(search.data->decimated()),
       projection_(estimation::model_columns(*search.data, search.base.terms), search.base.root_weights),
-      base_torque_(estimation::model_torque(*search.data, search.base.terms)) {}
+      base_torque_(estimation::model_torque(coarse_, search.base.terms)) {}
 
 // The expected score of the search: noise plus the squares of the effect's orthogonal part, against noise alone.
 bool DetectionLimit::named(const CandidateFit& candidate, const Eigen::VectorXd& own, double scale) const {
@@ -138,7 +139,7 @@ std::optional<Detectable> DetectionLimit::of_wave(const CandidateFit& candidate,
   for (int i = 0; i < 2; ++i) {
     term.values[cosine] = i == 0 ? usual : 0.0;
     term.values[sine] = i == 0 ? 0.0 : usual;
-    parts[i] = estimation::model_torque(*search_->data, terms) - base_torque_;
+    parts[i] = estimation::model_torque(coarse_, terms) - base_torque_;
   }
   for (int i = 0; i < kPhases; ++i) {
     const double phase = std::numbers::pi * i / kPhases;
@@ -159,7 +160,7 @@ std::optional<Detectable> DetectionLimit::of_nonlinear(const CandidateFit& candi
   if (size == term.values.size()) return std::nullopt;
   const auto torque_at = [&](double value) -> Eigen::VectorXd {
     term.values[size] = value;
-    return estimation::model_torque(*search_->data, terms) - base_torque_;
+    return estimation::model_torque(coarse_, terms) - base_torque_;
   };
   const auto& info = term.entry->parameters[size];
   if (info.low < 0.0 && info.per.empty()) {

@@ -16,8 +16,7 @@ class DetectionLimit {
  public:
   explicit DetectionLimit(const BalanceSearch& search);
 
-  // Nothing where the effect has no single size, or none within its bounds would be named. Columns are made in `data`,
-  // a copy of the search's: each thread has its own.
+  // Nothing where the effect has no single size, or none within its bounds would be named.
   std::optional<Detectable> smallest(const CandidateFit& candidate) const;
 
  private:
@@ -28,6 +27,7 @@ class DetectionLimit {
   std::optional<Detectable> of_nonlinear(const CandidateFit& candidate, estimation::Terms terms) const;
 
   const BalanceSearch* search_;
+  RegressionProblem coarse_;  // the same samples from decimated signals: near enough for a size
   estimation::ModelProjection projection_;
   Eigen::VectorXd base_torque_;
 };

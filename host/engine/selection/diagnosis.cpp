@@ -22,6 +22,7 @@
 #include "host/engine/selection/named_by_resampling.hpp"
 #include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
+#include "host/engine/selection/output_angle_period.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
 #include "host/engine/selection/remainder.hpp"
 #include "host/engine/selection/resampling.hpp"
@@ -89,6 +90,7 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
   for (SearchedBalance& one : all) {
     add_other_balance_evidence(searches, one.search, one.candidates);
     check_orders(searches, one.search, one.candidates);
+    check_output_angle_period(one.search, one.candidates);
     check_by_record(one.search, one.candidates);
     // Of the torsion each record has a zero of its own, which the held-out ones were not fitted for.
     if (one.search.data->balance() != estimation::Balance::motor) {

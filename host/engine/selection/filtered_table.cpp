@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "host/common/signals/butterworth.hpp"
 
@@ -56,34 +58,47 @@ Decimation decimation_of(const Run& run, double cutoff_hz) {
   return d;
 }
 
-// Filters the samples of a run of `table` into those of `made`, which has the columns `chosen`.
-void filter_run(const RegressorTable& table, const ChosenColumns& chosen, const Run& run, RegressorTable& made,
-                const Run& into) {
+// Where one column of a table is taken from and put.
+struct ColumnPair {
+  const double* from;
+  double* into;
+};
+
+// The columns and targets that a filtered table takes.
+std::vector<ColumnPair> column_pairs(const RegressorTable& table, const ChosenColumns& chosen, RegressorTable& made) {
+  std::vector<ColumnPair> pairs;
+  for (std::size_t j = 0; j < chosen.columns.size(); ++j)
+    pairs.push_back({table.columns.col(chosen.columns[j]).data(), made.columns.col(std::ssize(pairs)).data()});
+  pairs.push_back({table.target.data(), made.target.data()});
+  if (!made.presliding) return pairs;
+  PreslidingColumns& into = *made.presliding;
+  for (std::size_t j = 0; j < chosen.presliding.size(); ++j)
+    pairs.push_back({table.presliding->columns.col(chosen.presliding[j]).data(),
+                     into.columns.col(static_cast<Eigen::Index>(j)).data()});
+  pairs.push_back({table.presliding->target.data(), into.target.data()});
+  return pairs;
+}
+
+// Filters the samples of a run of `table` into those of `made`.
+void filter_run(const RegressorTable& table, std::span<const ColumnPair> pairs, const Run& run,
+                const RegressorTable& made, const Run& into) {
+  constexpr std::size_t kTogether = 8;  // columns: as many as are filtered at once, and stay in the cache
   const Eigen::Index n = run.last - run.first;
-  const auto own = std::ssize(chosen.columns), presliding = std::ssize(chosen.presliding);
-  Eigen::MatrixXd rows(n, own + 1 + (made.presliding ? presliding + 1 : 0));
-  for (Eigen::Index j = 0; j < own; ++j)
-    rows.col(j) = table.columns.col(chosen.columns[static_cast<std::size_t>(j)]).segment(run.first, n);
-  rows.col(own) = table.target.segment(run.first, n);
-  if (made.presliding) {
-    for (Eigen::Index j = 0; j < presliding; ++j)
-      rows.col(own + 1 + j) =
-          table.presliding->columns.col(chosen.presliding[static_cast<std::size_t>(j)]).segment(run.first, n);
-    rows.rightCols(1) = table.presliding->target.segment(run.first, n);
-  }
-  if (made.highest_hz < 0.99 * table.highest_hz) {
-    const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
-                                          std::min(made.highest_hz, 0.45 / run.row_s), 1.0 / run.row_s);
-    filter.apply_columns_in_place(rows);
-  }
   const Decimation d = decimation_of(run, made.highest_hz);
-  const auto taken = Eigen::seqN(d.first, d.rows, d.step);
-  const auto places = Eigen::seqN(into.first, d.rows);
-  for (Eigen::Index j = 0; j < own; ++j) made.columns.col(j)(places) = rows.col(j)(taken);
-  made.target(places) = rows.col(own)(taken);
-  if (!made.presliding) return;
-  for (Eigen::Index j = 0; j < presliding; ++j) made.presliding->columns.col(j)(places) = rows.col(own + 1 + j)(taken);
-  made.presliding->target(places) = rows.rightCols(1)(taken, 0);
+  const bool is_narrower = made.highest_hz < 0.99 * table.highest_hz;
+  const signals::ZeroPhaseFilter filter(signals::ZeroPhaseFilter::kDefaultOrder,
+                                        std::min(made.highest_hz, 0.45 / run.row_s), 1.0 / run.row_s);
+  Eigen::MatrixXd rows;
+  for (std::size_t first = 0; first < pairs.size(); first += kTogether) {
+    const auto some = pairs.subspan(first, std::min(kTogether, pairs.size() - first));
+    rows.resize(n, std::ssize(some));
+    for (std::size_t j = 0; j < some.size(); ++j)
+      std::copy_n(some[j].from + run.first, n, rows.col(static_cast<Eigen::Index>(j)).data());
+    if (is_narrower) filter.apply_columns_in_place(rows);
+    for (std::size_t j = 0; j < some.size(); ++j)
+      for (Eigen::Index k = 0; k < d.rows; ++k)
+        some[j].into[into.first + k] = rows(d.first + k * d.step, static_cast<Eigen::Index>(j));
+  }
 }
 
 }  // namespace
@@ -106,7 +121,8 @@ RegressorTable filtered_table(const RegressorTable& table, ChosenColumns chosen,
     made.presliding->columns.resize(rows, made.presliding->columns.cols());
     made.presliding->target.resize(rows);
   }
-  for (std::size_t i = 0; i < table.runs.size(); ++i) filter_run(table, chosen, table.runs[i], made, made.runs[i]);
+  const std::vector<ColumnPair> pairs = column_pairs(table, chosen, made);
+  for (std::size_t i = 0; i < table.runs.size(); ++i) filter_run(table, pairs, table.runs[i], made, made.runs[i]);
   return made;
 }
 

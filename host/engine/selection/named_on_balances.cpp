@@ -18,7 +18,7 @@ namespace flexspline::selection {
 // Puts the effect to name first. Returns the name of an effect that it is named for as well, if there is one.
 std::string choose_named(SearchedBalance& chosen) {
   auto& list = chosen.candidates;
-  if (auto instead = backward_elimination(chosen.search, list.front())) {
+  if (auto instead = backward_elimination(chosen.search, list)) {
     const auto is_it = [&](const CandidateFit& t) {
       return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
     };

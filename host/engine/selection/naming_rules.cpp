@@ -87,7 +87,7 @@ bool is_supported(const FoundOnMotor& e) {
   return may_be_stated(e.resampling, e.found, e.motor);
 }
 std::string is_not_supported(const FoundOnMotor& e) {
-  if (is_of_output_angle(e.found.group.front()))
+  if (std::ranges::any_of(e.found.group, is_of_output_angle))
     return "other functions of the output's angle look like it on these data: its likelihood would have to be "
            "significant, with 5 % of the squared error where the noise is not known, or the squared error on "
            "experiments that are held out to fall by half";
@@ -132,6 +132,19 @@ bool agrees_with_likelihood(const FoundOnMotor& e) {
 std::string is_against_likelihood(const FoundOnMotor& e) {
   return fmt::format("with it, the likelihood of all data falls (score {:.0f})",
                      candidate_to_judge(e.found, e.motor)->gain.score);
+}
+
+// A member that is a wave of the output's angle whose period the data do not show; null: none.
+const CandidateFit* of_uncertain_period(const FoundOnMotor& e) {
+  for (const NamedEffect& n : e.found.group)
+    if (const CandidateFit* c = candidate_named(e.motor, n); c && c->has_uncertain_period) return c;
+  return nullptr;
+}
+bool has_certain_period(const FoundOnMotor& e) {
+  return of_uncertain_period(e) == nullptr;
+}
+std::string has_uncertain_period(const FoundOnMotor& e) {
+  return of_uncertain_period(e)->why_not;
 }
 
 bool is_likeliest_of_confused(const FoundOnMotor& e) {
@@ -182,6 +195,7 @@ constexpr auto kRules = std::to_array<NamingRule>({
     {"second choice, or near the floor of few records: held-out error", is_confirmed_where_needed, is_not_confirmed},
     {"presliding: held-out error, or nearly all subsamples", is_certain_presliding, is_uncertain_presliding},
     {"the likelihood of all data does not contradict", agrees_with_likelihood, is_against_likelihood},
+    {"a wave of the output's angle: the data show its period", has_certain_period, has_uncertain_period},
     {"no effect that halves cannot choose is likelier", is_likeliest_of_confused, another_is_likelier},
     {"not behind a group that the data cannot distinguish", is_not_behind_group, is_behind_group},
     {"behind another: a single effect", is_single_behind_another, is_group_behind_another},
@@ -216,8 +230,10 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
   const bool is_supported = frequency_of_all >= kPolicy.min_frequency_of_all || found.is_confirmed();
   const bool leaves_known_noise =
       motor.floor.rmse && motor.search.base.rmse() <= (1.0 + kPolicy.floor_uncertainty) * *motor.floor.rmse;
+  // What the data cannot distinguish from a wave of the output's angle is the same function of it.
+  const bool is_enough =
+      std::ranges::any_of(found.group, is_of_output_angle) ? found.is_most_of_held_out_error() : is_supported;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
-    const bool is_enough = is_of_output_angle(name) ? found.is_most_of_held_out_error() : is_supported;
     if (is_enough && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
     return is_significant(motor, name);
   });

@@ -45,7 +45,8 @@ bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& 
 // experiments that are held out falls by a term's share, or the likelihood of all data is significant for one. Where
 // the model alone leaves known noise, many subsamples abstain and the others may have selected noise, so that their
 // frequency does not count; but likelihood leaves out reversals, and cannot judge a state of presliding. For an effect
-// of the output's angle the frequency does not count either, and the held-out error has to fall by half.
+// of the output's angle, or a group with one, the frequency does not count either, and the held-out error has to fall
+// by half.
 bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& found, const SearchedBalance& motor);
 
 }  // namespace flexspline::selection

@@ -115,6 +115,8 @@ struct SelectionPolicy {
   double named_chi2_percent = 0.5;
   // Score within which two effects are not distinguished (step 12).
   double confounded_margin = 10.0;
+  // Difference of the BIC of two models from which on it is positive evidence for one of them (Kass and Raftery 1995).
+  double positive_evidence = 2.0;
   // Of the one-sided sign test over records that were predicted without them: four of four are enough, three of three
   // are not.
   double sign_test_p_value = 0.1;

@@ -48,44 +48,47 @@ std::vector<Eigen::Index> presliding_columns(const RegressorTable& table) {
   return columns;
 }
 
-// Number of blocks of one record: in proportion to its samples, at least two, so that each half can have one.
-void add_blocks(Setting& setting, std::vector<Eigen::MatrixXd>& products, std::size_t record,
+// Appends the blocks of one record, with the products of their samples: so many that they are in proportion to its
+// samples, at least two, so that each half can have one.
+void add_blocks(Setting& setting, std::vector<Eigen::VectorXd>& products, std::size_t record,
                 Eigen::Index rows_of_record, std::size_t blocks) {
   const Eigen::Index columns = setting.rows.cols();
   const auto parts =
       std::max<Eigen::Index>(2, std::lround(static_cast<double>(blocks) * static_cast<double>(rows_of_record) /
                                             static_cast<double>(setting.rows.rows())));
-  Eigen::Index seen = 0;
-  const std::size_t first = setting.blocks.size();
-  setting.blocks.resize(first + static_cast<std::size_t>(parts), {record, 0.0});
-  products.resize(setting.blocks.size(), Eigen::MatrixXd::Zero(columns, columns));
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(columns, columns);
+  Block block{record, 0.0};
+  Eigen::Index seen = 0, part = 0;
+  const auto finish = [&] {
+    if (block.rows > 0.0) {
+      products.push_back(lower_triangle(product));
+      setting.blocks.push_back(block);
+      product.setZero();
+      block.rows = 0.0;
+    }
+  };
   for (const Run& run : setting.runs) {
     if (run.record != record) continue;
     for (Eigen::Index k = run.first; k < run.last;) {
       const Eigen::Index b = std::min(parts - 1, (seen * parts) / rows_of_record);
+      if (b != part) finish();
+      part = b;
       const Eigen::Index end_of_block = ((b + 1) * rows_of_record + parts - 1) / parts;
       const Eigen::Index many = std::max<Eigen::Index>(1, std::min(run.last - k, end_of_block - seen));
-      const std::size_t block = first + static_cast<std::size_t>(b);
-      products[block].selfadjointView<Eigen::Lower>().rankUpdate(setting.rows.middleRows(k, many).transpose());
-      setting.blocks[block].rows += static_cast<double>(many);
+      product.selfadjointView<Eigen::Lower>().rankUpdate(setting.rows.middleRows(k, many).transpose());
+      block.rows += static_cast<double>(many);
       k += many;
       seen += many;
     }
   }
+  finish();
 }
 
-// Puts the products of the blocks into columns, without blocks that have no samples.
-void take_products(Setting& setting, std::vector<Eigen::MatrixXd>& products) {
+// Puts the products of the blocks into columns.
+void take_products(Setting& setting, const std::vector<Eigen::VectorXd>& products) {
   const Eigen::Index columns = setting.rows.cols();
-  std::vector<Block> blocks;
   setting.products.resize(columns * (columns + 1) / 2, std::ssize(products));
-  for (std::size_t b = 0; b < products.size(); ++b) {
-    if (setting.blocks[b].rows == 0.0) continue;
-    setting.products.col(std::ssize(blocks)) = lower_triangle(products[b]);
-    blocks.push_back(setting.blocks[b]);
-  }
-  setting.products.conservativeResize(Eigen::NoChange, std::ssize(blocks));
-  setting.blocks = std::move(blocks);
+  for (std::size_t b = 0; b < products.size(); ++b) setting.products.col(static_cast<Eigen::Index>(b)) = products[b];
 }
 
 }  // namespace
@@ -160,7 +163,7 @@ Setting make_setting(const RegressorTable& table, const ChosenColumns& chosen, b
   for (const TakenRun& one : taken) setting.runs.push_back(one.run);
   std::vector<Eigen::Index> of_record(table.records, 0);
   for (const Run& run : setting.runs) of_record[run.record] += run.last - run.first;
-  std::vector<Eigen::MatrixXd> products;
+  std::vector<Eigen::VectorXd> products;
   for (std::size_t r = 0; r < table.records; ++r)
     if (of_record[r] > 0) add_blocks(setting, products, r, of_record[r], policy.blocks);
   take_products(setting, products);
