@@ -202,7 +202,7 @@ void add_drive(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--seed", options->seed,
                       "of the sensors' noise, and of the motor's angle at power-on (default 1)");
-  command->add_option("--wake-turns", options->wake_turns, "the motor's angle at power-on (default: random within 2)")
+  command->add_option("--start-turns", options->wake_turns, "the motor's angle at power-on (default: random within 2)")
       ->check(CLI::Range(-100.0, 100.0));
   command->footer("Example: flexspline-hil drive --scenario slow-reversals --seconds 4");
   command->callback([options] { flexspline::scenario::run_drive(*options); });
@@ -274,7 +274,7 @@ void take_twin_drive(CLI::App& command, flexspline::twin::TwinOptions& options) 
 
 // What goes wrong, and how it runs.
 void take_twin_run(CLI::App& command, flexspline::twin::TwinOptions& options) {
-  command.add_option("--cable", options.cable_file,
+  command.add_option("--link-fault", options.link_fault_file,
                      "file that unplugs it: contains in, out, or out N (after N more messages of the host)");
   command.add_option("--inject", options.inject, "failure after it was armed, such as motor-encoder-stuck");
   command.add_option("--inject-at", options.inject_at_s, "time after it was armed, s (default 1)");

@@ -7,7 +7,7 @@
 
 namespace flexspline::twin {
 
-/// Injects faults on the twin's link: a file unplugs its cable and plugs it in again. The file's words: `in`; `out`;
+/// Injects faults on the twin's link: a file unplugs it and plugs it in again. The file's words: `in`; `out`;
 /// `out N`, which unplugs it after N more messages from the host, in the middle of any operation. FILE.state has the
 /// present state: `in`, `out`, `in N` while N is counted, so that the writer can wait for it. Without the file nothing
 /// changes.

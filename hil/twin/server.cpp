@@ -99,7 +99,7 @@ class Server {
         pairing_(options.flash_file.empty() ? "" : options.flash_file + ".pairing"),
         setup_(setup_of(options)),
         line_(line_of(options)),
-        link_fault_(options.cable_file) {
+        link_fault_(options.link_fault_file) {
     setup_.flash = &flash_;
     setup_.pairing = &pairing_;
     usb_ = dynamic_cast<UsbLine*>(line_.get());
@@ -160,7 +160,7 @@ class Server {
     int wait_ms = 0;
     while (!over() && (!leaves_at || Clock::now() < *leaves_at)) {
       link_fault_.read_file();
-      follow_cable();
+      follow_link_fault();
       if (line_->transfer(wait_ms)) drive_->service().disconnected();
       // Waiting data of the drive are sent first, before room on the line counts as time to run.
       exchange();
@@ -182,7 +182,7 @@ class Server {
     const bool streams = mode == firmware::Mode::position || mode == firmware::Mode::velocity;
     return streams ? kMostAheadOfSetPoints : kMostAhead;
   }
-  void follow_cable() {
+  void follow_link_fault() {
     if (link_fault_.plugged() == std::exchange(was_plugged_, link_fault_.plugged())) return;
     line_->plug(link_fault_.plugged());
     drive_->service().disconnected();
@@ -216,7 +216,7 @@ class Server {
       link_fault_.count();
       if (!link_fault_.plugged()) break;
     }
-    follow_cable();
+    follow_link_fault();
     protocol::Message m;
     while (line_->has_room() && drive_->service().next(m)) line_->send(m);
   }

@@ -113,8 +113,8 @@ Failure failure_of(drive::Session& session, const protocol::CommissioningProgres
     case CommissioningState::stopped:
       return {"stopped", "it was stopped by request", "run it again"};
     case CommissioningState::host_lost:
-      return {"host_lost", "the drive heard nothing of this host for half a second",
-              "check cable and load of the host"};
+      return {"host_lost", "the drive received no request for half a second",
+              "check the cable and whether this computer is overloaded"};
     case CommissioningState::drive_fault: {
       const auto text = protocol::fault_text(session.status().fault, session.status().fault_limit);
       return {std::string(text.name), std::string(text.reason), "find the cause; disarming does not clear a fault"};

@@ -10,9 +10,9 @@ namespace flexspline::cli {
 namespace {
 
 struct TwinOptions {
-  std::filesystem::path plant;  // empty: the demo's drive
-  std::filesystem::path flash;  // empty: what is flashed ends with the twin
-  std::filesystem::path cable;  // unplugs it while this text is shown; empty: none
+  std::filesystem::path plant;       // empty: the demo's drive
+  std::filesystem::path flash;       // empty: what is flashed ends with the twin
+  std::filesystem::path link_fault;  // file that injects faults on its link; empty: none
   std::string serial = "TWIN";
   int serve = 0;   // port; zero: any that is free
   int usbip = -1;  // port of a USB device; below zero: none
@@ -28,7 +28,7 @@ int run(const TwinOptions& options, Console&) {
   };
   give("--plant", options.plant.string());
   give("--flash", options.flash.string());
-  give("--cable", options.cable.string());
+  give("--link-fault", options.link_fault.string());
   give("--json", options.json);
   if (options.usbip >= 0) give("--usbip", std::to_string(options.usbip));
   if (options.usbip < 0) give("--serve", std::to_string(options.serve));
@@ -41,7 +41,7 @@ void declare(Parser& parser, TwinOptions& options) {
   parser.option("--plant", options.plant, "plant file (default: the demo's drive)").value("FILE");
   parser.option("--flash", options.flash, "file with its flash memory (default: none)").value("FILE");
   parser
-      .option("--cable", options.cable,
+      .option("--link-fault", options.link_fault,
               "file that connects or disconnects it: in, out, or out N (after N more messages)")
       .value("FILE");
   parser.option("--serial", options.serial, "serial number").shows_default().value("TEXT");

@@ -9,7 +9,7 @@
 #include "tests/cli/tool.hpp"
 #include "tests/cli/twin_process.hpp"
 
-namespace flexspline::cli_test::drive_cable_test {
+namespace flexspline::cli_test::drive_link_fault_test {
 namespace {
 
 using nlohmann::json;
@@ -26,23 +26,23 @@ std::string model_with(double viscous) {
 class PulledPlug : public ::testing::Test {
  protected:
   // The twin has done it when this returns.
-  void cable(const std::string& word) {
-    shell_.write("cable.new", word + "\n");
-    std::filesystem::rename(shell_.folder() / "cable.new", shell_.folder() / "cable");
+  void link_fault(const std::string& word) {
+    shell_.write("link-fault.new", word + "\n");
+    std::filesystem::rename(shell_.folder() / "link-fault.new", shell_.folder() / "link-fault");
     const std::string expected = word.starts_with("out ") ? "in" + word.substr(3) + "\n" : word + "\n";
     for (int i = 0; i < 6000; ++i) {
-      if (shell_.file("cable.state") == expected) return;
+      if (shell_.file("link-fault.state") == expected) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    FAIL() << "the twin does not follow its cable: " << word;
+    FAIL() << "the twin does not follow its link-fault file: " << word;
   }
   Answer tool(const std::string& line) { return shell_.run("flexspline " + line + " --drive " + twin_.name()); }
   // Runs a command whose plug is pulled after `messages` of it.
   Answer cut(const std::string& line, int messages) {
-    cable("in");
-    cable("out " + std::to_string(messages));
+    link_fault("in");
+    link_fault("out " + std::to_string(messages));
     const Answer answer = tool(line);
-    cable("in");
+    link_fault("in");
     return answer;
   }
   static void expect_clear(const Answer& answer, const std::string& line) {
@@ -57,7 +57,7 @@ class PulledPlug : public ::testing::Test {
   }
 
   Shell shell_;
-  TwinProcess twin_{{"--serve", "0", "--cable", (shell_.folder() / "cable").string()}};
+  TwinProcess twin_{{"--serve", "0", "--link-fault", (shell_.folder() / "link-fault").string()}};
 };
 
 TEST_F(PulledPlug, WhileFlashingLeavesTheOldBlockOrTheNewOneAndTheNextTryWorks) {
@@ -109,9 +109,9 @@ TEST_F(PulledPlug, InDrivesBackupMonitorAndRecordIsAClearErrorAndTheNextTryWorks
                "format = \"flexspline-plan/1\"\nsample_s = 0.001\n[[run]]\nname = \"run\"\nmode = \"velocity\"\n"
                "waveform = \"sine\"\namplitude = 50\nfrequency_hz = 2\nduration_s = 1\n");
   const std::string drives = "flexspline drives --json - --also " + twin_.name();
-  cable("out 1");
+  link_fault("out 1");
   const Answer found = shell_.run(drives);
-  cable("in");
+  link_fault("in");
   ASSERT_EQ(found.code, 0) << found.err;
   EXPECT_FALSE(json::parse(found.out)["drives"].back()["usable"].get<bool>());
   EXPECT_TRUE(contains(json::parse(found.out)["drives"].back()["problem"].get<std::string>(), "gone")) << found.out;
@@ -154,4 +154,4 @@ TEST_F(PulledPlug, InDrivesBackupMonitorAndRecordIsAClearErrorAndTheNextTryWorks
 }
 
 }  // namespace
-}  // namespace flexspline::cli_test::drive_cable_test
+}  // namespace flexspline::cli_test::drive_link_fault_test
