@@ -25,29 +25,31 @@ double torque_at(double t, double hz) {
   return -1e-3 * rate * rate * q + 1e-3 * w + std::copysign(0.05, w);
 }
 
-// The current acts `delay_s` later than it is logged.
-std::unique_ptr<Identification> axis(double delay_s, double noise_a, data::Dataset& dataset) {
+// The current acts `delay_s` later than it is logged, and makes less torque by `saturation` times its cube.
+std::unique_ptr<Identification> axis(double delay_s, double noise_a, data::Dataset& dataset,
+                                     double saturation_per_a2 = 0.0) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0.0, noise_a);
   for (const double hz : {0.3, 0.5, 0.8})
     dataset.experiments.push_back(
         tests::written_experiment(std::to_string(hz), kSampleS, 3000, [&](double t, data::Experiment& e) {
           e[Column::motor_position].push_back(30.0 * std::sin(kTurn * hz * t));
-          e[Column::current].push_back(torque_at(t + delay_s, hz) / kNm + noise(random));
+          const double current = torque_at(t + delay_s, hz) / kNm;
+          e[Column::current].push_back(current + saturation_per_a2 * std::pow(current, 3) + noise(random));
         }));
   model::Model model = tests::plain_model();
   model.drive.torque_constant_nm_a.value = kNm;
   return identify(dataset, model, {});
 }
 
-// What a delay of the current gains on data left out, beyond a lag that the fit has anyhow.
-selection::LikelihoodGain gain_of_delay(const Identification& identified) {
+// What an effect gains on data left out; a delay, beyond a lag that the fit has anyhow.
+selection::LikelihoodGain gain_of(std::string_view effect, const Identification& identified) {
   const RegressionProblem& data = identified.data.front();
   selection::BalanceSearch search{&data, Eigen::VectorXd::Ones(data.rows()), {}};
   search.base = selection::cross_validate(data, identified.terms, search.keep);
-  const auto delays = selection::rank_candidates(
-      search, [](const selection::CandidateModel& model) { return model.entry->name() == "current_delay"; });
-  return delays.front().gain;
+  const auto candidates = selection::rank_candidates(
+      search, [&](const selection::CandidateModel& model) { return model.entry->name() == effect; });
+  return candidates.front().gain;
 }
 
 TEST(ModelledCurrent, IsTheTorqueOfTheModelOverTheTorqueConstant) {
@@ -80,18 +82,35 @@ TEST(ModelledCurrent, IsReadByWhatRemembersTheCurrentAlone) {
 TEST(ModelledCurrent, KeepsADelayFromExplainingTheNoiseOfTheMeasuredOne) {
   data::Dataset dataset;
   const auto identified = axis(0.0, 0.2, dataset);
-  EXPECT_GT(gain_of_delay(*identified).chi2_percent, 10.0);
-  EXPECT_GT(gain_of_delay(*identified).score, selection::kPolicy.named_score);
+  EXPECT_GT(gain_of("current_delay", *identified).chi2_percent, 10.0);
+  EXPECT_GT(gain_of("current_delay", *identified).score, selection::kPolicy.named_score);
   take_modelled_current(identified->prepared, identified->terms);
-  EXPECT_LT(gain_of_delay(*identified).chi2_percent, 1.0);
-  EXPECT_LT(gain_of_delay(*identified).score, selection::kPolicy.named_score);
+  EXPECT_LT(gain_of("current_delay", *identified).chi2_percent, 1.0);
+  EXPECT_LT(gain_of("current_delay", *identified).score, selection::kPolicy.named_score);
 }
 
 TEST(ModelledCurrent, ShowsADelayThatIsThere) {
   data::Dataset dataset;
   const auto identified = axis(8e-3, 0.02, dataset);
   take_modelled_current(identified->prepared, identified->terms);
-  EXPECT_GT(gain_of_delay(*identified).score, selection::kPolicy.named_score);
+  EXPECT_GT(gain_of("current_delay", *identified).score, selection::kPolicy.named_score);
+}
+
+// The cube of a noisy current has three times its square times the noise.
+TEST(ModelledCurrent, KeepsASaturationFromExplainingTheNoiseOfTheMeasuredOne) {
+  data::Dataset measured_data, data;
+  const auto measured = axis(0.0, 4.0, measured_data);
+  EXPECT_GT(gain_of("torque_constant_saturation", *measured).score, selection::kPolicy.named_score);
+  const auto identified = axis(0.0, 4.0, data);
+  take_modelled_current(identified->prepared, identified->terms);
+  EXPECT_LT(gain_of("torque_constant_saturation", *identified).score, 0.0);
+}
+
+TEST(ModelledCurrent, ShowsASaturationThatIsThere) {
+  data::Dataset dataset;
+  const auto identified = axis(0.0, 0.02, dataset, 0.01);
+  take_modelled_current(identified->prepared, identified->terms);
+  EXPECT_GT(gain_of("torque_constant_saturation", *identified).score, selection::kPolicy.named_score);
 }
 
 TEST(ModelledCurrent, IsNotTakenWhereTheModelHasSuchAMemory) {

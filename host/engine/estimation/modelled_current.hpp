@@ -7,7 +7,8 @@
 namespace flexspline::estimation {
 
 // Gives the records the current that `terms`, with values, make of motion and load, A, for effects with a memory of the
-// current (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no current is measured.
+// current, or nonlinear in it (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no
+// current is measured.
 void take_modelled_current(PreparedData& prepared, const Terms& terms);
 
 }  // namespace flexspline::estimation

@@ -49,8 +49,8 @@ class RecordSignals {
   std::vector<double> torque;  // filtered as positions are
   std::vector<double> temperature;
   ScaledSignal current;
-  // The current that a model makes of the motion, for effects with a memory of the current: with a measured one they
-  // average its noise, and explain the noise of the effort with it. Empty: they read the measured one.
+  // The current that a model makes of the motion, for effects with a memory of the current, or nonlinear in it: with a
+  // measured one they explain the noise of the effort by its own noise. Empty: they read the measured one.
   std::vector<double> modelled_current;
   std::array<std::vector<double>, 3> directions;  // by balance: of velocity, torsion rate, output velocity
 

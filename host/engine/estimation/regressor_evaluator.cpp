@@ -43,18 +43,25 @@ const catalogue::BlockFunctions<N>& functions_of(const catalogue::Entry& entry) 
     return entry.dual;
 }
 
-// Signals that a term's torque reads. kWholeRecord for effects with memory, with inputs that others change, or with a
-// formula (which would be parsed again for each block).
+// A memory of the measured current averages its noise, and a coefficient of a nonlinear function of it is estimated
+// from noise that is in the effort, too: both read the modelled one. A limit of the current shows in the measured one
+// alone.
+bool reads_modelled_current(const Term& term) {
+  if (term.entry->definition) return false;
+  return term.entry->has_state || (term.entry->info->reads == effects::kCurrent && term.entry->count(Kind::linear) > 0);
+}
+
+// Signals that a term's torque reads. kWholeRecord for effects with memory, with inputs that others change, of the
+// modelled current, or with a formula (which would be parsed again for each block).
 unsigned reads_of(const Terms& terms, const Term& term) {
-  if (term.entry->has_state || term.entry->definition) return kWholeRecord;
+  if (reads_modelled_current(term) || term.entry->definition) return kWholeRecord;
   for (const Term& other : terms)
     if (changes_inputs_of(other, term)) return kWholeRecord;
   return term.entry->info->reads;
 }
 
-// The signals of a record that a term reads: what remembers the current reads the modelled one.
 unsigned current_for(const Term& term) {
-  return term.entry->has_state && !term.entry->definition ? RecordSignals::kModelledCurrent : 0;
+  return reads_modelled_current(term) ? RecordSignals::kModelledCurrent : 0;
 }
 
 // Calls add(balance, sum) for each balance that the term acts on, and weighs the sum by share(balance).

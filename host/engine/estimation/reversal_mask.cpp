@@ -38,7 +38,7 @@ bool has_torsion(const Record& r) {
 
 double mean_torsion(const Record& r) {
   double sum = 0.0;
-  for (std::size_t k = 0; k < r.inputs.size(); ++k) sum += r.inputs[k].torsion;
+  for (std::size_t k = 0; k < r.inputs.size(); ++k) sum += r.inputs.torsion_at(k);
   return sum / static_cast<double>(r.inputs.size());
 }
 
@@ -49,7 +49,7 @@ bool has_large_torsion(const Record& r, double cutoff_hz) {
   if (!has_torsion(r)) return false;
   const double middle = mean_torsion(r);
   double squares = 0.0;
-  for (std::size_t k = 0; k < r.inputs.size(); ++k) squares += std::pow(r.inputs[k].torsion - middle, 2);
+  for (std::size_t k = 0; k < r.inputs.size(); ++k) squares += std::pow(r.inputs.torsion_at(k) - middle, 2);
   const double deviation = std::sqrt(squares / static_cast<double>(r.inputs.size()));
   const double noise =
       r.velocity_noise[index(Balance::transmission)] * std::sqrt(3.0) / (2.0 * std::numbers::pi * cutoff_hz);
@@ -172,7 +172,7 @@ bool masks_most_torsion(const std::vector<Record>& records, const Pipeline& pipe
   for (const Record& r : records) {
     if (!has_large_torsion(r, pipeline.row_cutoff_hz)) continue;
     const double middle = mean_torsion(r);
-    const auto information = [&](std::size_t k) { return std::pow(r.inputs[k].torsion - middle, 2); };
+    const auto information = [&](std::size_t k) { return std::pow(r.inputs.torsion_at(k) - middle, 2); };
     for (std::size_t k = 0; k < r.inputs.size(); k += r.decimation) all += information(k);
     if (shows_torsion(r))
       for (const std::size_t k : r.rows[index(Balance::transmission)].samples) left += information(k);
