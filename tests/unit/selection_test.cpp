@@ -446,6 +446,21 @@ TEST(Decision, APlaceboWaveSaysNothingAgainstALawThatIsNoWave) {
   EXPECT_NEAR(found[0].frequency, 0.95, 1e-12);  // those that chose a wave chose it for what gravity has
 }
 
+TEST(Decision, WavesThatAreRefutedByALawAreNotFoundASecondTimeByThemselves) {
+  Stability s;
+  s.subsamples = 100.0;
+  s.frequencies = {frequency("gravity", 0.6, 1.0, 0.6), wave("order 1", 1.0, 0.4, 0.6),
+                   wave("placebo order 1.27", 1.27, 0.3, 0.6, true)};
+  s.frequencies[0].first = 0.6;
+  s.frequencies[1].first = 0.4;
+  s.frequencies[0].alternatives = {{"order 1", 0.9}, {"placebo order 1.27", 0.9}};
+  s.frequencies[1].alternatives = {{"gravity", 0.9}, {"placebo order 1.27", 0.9}};
+  const auto found = decide(s, {});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].group.front().name, "gravity");
+  EXPECT_TRUE(undecided(s, found, {}).empty());
+}
+
 TEST(Decision, AnEffectOfOneParameterThatDoesAsWellAsTheWavesIsTakenForThem) {
   Stability s;
   s.subsamples = 100.0;

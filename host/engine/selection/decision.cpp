@@ -34,13 +34,17 @@ bool has_unknown(const std::vector<FoundTerm>& found) {
 
 // A placebo wave that does as well shows that no order is identifiable here. Where an effect that is no wave was chosen
 // `least` often, or was nearly as good as what was, this refutes the waves only: they were chosen for what they share
-// with that effect, which has fewer parameters.
-void leave_out_waves(double least, std::vector<Frequency>& group) {
-  if (std::none_of(group.begin(), group.end(), is_placebo)) return;
+// with that effect, which has fewer parameters. Returns the names of the waves.
+std::vector<std::string> leave_out_waves(double least, std::vector<Frequency>& group) {
+  if (std::none_of(group.begin(), group.end(), is_placebo)) return {};
   const auto is_other = [&](const Frequency& f) { return f.entry && !f.order && f.near >= least; };
-  if (std::none_of(group.begin(), group.end(), is_other)) return;
+  if (std::none_of(group.begin(), group.end(), is_other)) return {};
+  std::vector<std::string> waves;
+  for (const Frequency& f : group)
+    if (f.order) waves.push_back(f.name);
   std::erase_if(group, [](const Frequency& f) { return f.order.has_value(); });
   std::stable_sort(group.begin(), group.end(), [](const Frequency& a, const Frequency& b) { return a.near > b.near; });
+  return waves;
 }
 
 // Groups that at least `least` of the subsamples chose, without those in `taken`, to which their members are added.
@@ -69,10 +73,11 @@ std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, s
       found.group.push_back(*other);
       found.frequency += other->frequency;
     }
-    leave_out_waves(least, found.group);
+    const std::vector<std::string> refuted = leave_out_waves(least, found.group);
     found.share = found.group.front().share;
     found.frequency = std::min(found.frequency, lead.near);
     if (found.frequency < least) continue;
+    taken.insert(refuted.begin(), refuted.end());
     for (const Frequency& f : found.group) {
       taken.insert(f.name);
       if (!f.entry && f.name != kPresliding) found.in_catalogue = false;

@@ -10,7 +10,6 @@
 #include "host/engine/selection/detection_limit.hpp"
 
 namespace flexspline::selection {
-namespace {
 
 using estimation::Term;
 
@@ -56,8 +55,6 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
   }
   return c;
 }
-
-}  // namespace
 
 void explain_orders(const model::Drive& drive, Diagnosis& result) {
   for (Candidate& c : result.candidates) {

@@ -1,4 +1,4 @@
-// The candidates of a diagnosis, as the user is told of them.
+// The candidates of a diagnosis, as the user reads of them.
 #pragma once
 
 #include <vector>
@@ -7,6 +7,9 @@
 #include "host/engine/selection/searched_balance.hpp"
 
 namespace flexspline::selection {
+
+// A candidate of a balance with its values and errors.
+Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& search, data::Axis axis);
 
 // Adds the candidates of all balances to the result, admissible ones first and by their score, each with the smallest
 // size that would be named, and what of the model it cannot be distinguished from.

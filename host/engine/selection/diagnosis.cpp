@@ -23,6 +23,7 @@
 #include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/output_angle_period.hpp"
+#include "host/engine/selection/presliding_fit.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
 #include "host/engine/selection/remainder.hpp"
 #include "host/engine/selection/resampling.hpp"
@@ -246,6 +247,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (tests_between_records) look_between_records(*base, of_all_records, decision, result);
   name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *decision.motor : judged, model.drive,
                          result);
+  if (decision.motor) refit_presliding(dataset, model, options, *decision.motor, result);
   take_back_insignificant(result);
   explain_orders(base->model.drive, result);
   assess_excitation(decision.moves, result);
