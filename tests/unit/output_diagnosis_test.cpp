@@ -49,6 +49,7 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
   d.noise_of_some = {{"sine"}, 0.001, 0.0005, "periods"};
   d.reversals_left_out = true;
   d.delay_advice = "The effort lags.";
+  d.untried_advice = "Effects of the current were not tried.";
   ::testing::internal::CaptureStdout();
   {
     Console console("diagnose", false);
@@ -62,6 +63,8 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
                       "error is 2 times that"),
             std::string::npos)
       << text;
+  EXPECT_NE(text.find("Effects of the current were not tried."), std::string::npos) << text;
+  EXPECT_EQ(diagnosis_json(d).at("untried_advice"), "Effects of the current were not tried.");
   EXPECT_EQ(diagnosis_json(d).at("base").at("noise_of_some").at("experiments"), nlohmann::json({"sine"}));
 }
 

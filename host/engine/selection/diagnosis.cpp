@@ -214,6 +214,20 @@ void assess_excitation(bool moves, Diagnosis& result) {
   if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
 }
 
+// Effects of the current are no candidates where the effort is a torque, which often is a current times a constant.
+void list_untried(const estimation::PreparedData& prepared, Diagnosis& result) {
+  const bool lacks_more = result.partial || (result.named.empty() && result.verdict != Verdict::at_noise_floor);
+  if (prepared.effort_is_current || !lacks_more) return;
+  std::string names;
+  for (const catalogue::Entry& entry : catalogue::all())
+    if (entry.info->reads == effects::kCurrent && entry.info->balance == estimation::Balance::motor)
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", entry.name());
+  result.untried_advice = fmt::format(
+      "Effects of the current were not tried ({}), as the effort is a torque. If it was logged as a current times a "
+      "constant, map it as current_a and state torque_constant_nm_a.",
+      names);
+}
+
 // At the cut-off and the mask of the options: fits the model, judges the balance where most is missing, names what it
 // lacks, tests the names against what differs between records, and says what is left.
 Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, const Options& options) {
@@ -251,6 +265,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   take_back_insignificant(result);
   explain_orders(base->model.drive, result);
   assess_excitation(decision.moves, result);
+  list_untried(base->prepared, result);
   return result;
 }
 

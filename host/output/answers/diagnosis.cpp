@@ -288,6 +288,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   print_possible(console, d.possible);
   if (!d.localised.empty()) console.line(wrapped(fmt::format("The error depends on {}.", shares(d.localised))));
   if (!d.delay_advice.empty()) console.line(wrapped(d.delay_advice));
+  if (!d.untried_advice.empty()) console.line(wrapped(d.untried_advice));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));

@@ -202,6 +202,7 @@ json diagnosis_json(const Diagnosis& d) {
           {"unknown", unknown_json(d)},
           {"delay_s", json_number(d.delay_s)},
           {"delay_advice", d.delay_advice.empty() ? json(nullptr) : json(d.delay_advice)},
+          {"untried_advice", d.untried_advice.empty() ? json(nullptr) : json(d.untried_advice)},
           {"at_stated_setting", stated_setting_json(d)},
           {"warnings", d.warnings},
           {"rounds", json::array()}};

@@ -86,6 +86,8 @@ function fillRound(s, round) {
   if (telling.length) s.append(el("p", {}, `Most of the error depends on ${listed(telling)}; shares overlap, as these quantities move together.`));
   if (round.delay_s !== null)
     s.append(el("p", { class: "note" }, round.delay_advice));
+  if (round.untried_advice !== null)
+    s.append(el("p", { class: "note" }, round.untried_advice));
   const same = (a, b) => a.effect === b.effect && a.order === b.order;
   for (const named of round.named) {
     const c = round.candidates.find((x) => same(x, named));
