@@ -196,6 +196,12 @@ bool better(const CandidateFit& a, const CandidateFit& b) {
   return a.score() > b.score();
 }
 
+// Of two fits of one effect. Its score is over the autocorrelation time of what it leaves, which may be longer where it
+// leaves less.
+bool fits_better(const CandidateFit& a, const CandidateFit& b) {
+  return a.admissible != b.admissible ? a.admissible : a.gain.chi2_percent > b.gain.chi2_percent;
+}
+
 }  // namespace
 
 std::optional<std::size_t> position(const CrossValidatedFit& fit, std::string_view id, std::string_view parameter) {
@@ -328,7 +334,7 @@ std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
     CandidateFit again = evaluate(search, std::move(refined));
     // A value of the grid near an end of the range, where the best one stops, is no minimum either.
     const bool stops = !why_no_minimum(data, again.fit.terms.back()).empty() && again.score() > candidate.score();
-    if (better(again, candidate) || !candidate.admissible || stops) candidate = std::move(again);
+    if (fits_better(again, candidate) || !candidate.admissible || stops) candidate = std::move(again);
   });
   sort_candidates(search, candidates);
   return candidates;

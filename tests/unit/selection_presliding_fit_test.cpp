@@ -1,0 +1,57 @@
+// A law of presliding that is named comes with its values from all samples: friction that is written down as Dahl's.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "host/engine/selection/diagnosis.hpp"
+#include "shared/fixed/turn.hpp"
+#include "tests/support/plain_model.hpp"
+#include "tests/support/written_experiment.hpp"
+
+namespace flexspline::selection::selection_presliding_fit_test {
+namespace {
+
+using data::Column;
+
+constexpr double kTravel = 0.9, kFriction = 0.05;  // rad, N m
+
+// An axis that swings to and fro.
+data::Dataset axis() {
+  data::Dataset dataset;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0.0, 5e-4);
+  for (const double hz : {0.3, 0.5, 0.8}) {
+    double state = -1.0;
+    dataset.experiments.push_back(
+        tests::written_experiment(std::to_string(hz), 2e-3, 6000, [&](double t, data::Experiment& e) {
+          const double rate = kTurn * hz, q = -8.0 * std::cos(rate * t), w = 8.0 * rate * std::sin(rate * t);
+          const double end = w > 0.0 ? 1.0 : -1.0;
+          state = end + (state - end) * std::exp(-2e-3 * std::abs(w) / kTravel);
+          e[Column::motor_position].push_back(q);
+          e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 1e-3 * w + kFriction * state + noise(random));
+        }));
+  }
+  return dataset;
+}
+
+TEST(PreslidingFit, HasTheTravelAndTheFrictionOfAllSamplesAndTheErrorsThatItTakesOffThere) {
+  const Diagnosis found = diagnose(axis(), tests::plain_model(), {});
+  ASSERT_EQ(found.named.size(), 1U);
+  const auto law = std::ranges::find(found.candidates, found.named.front().effect, &Candidate::effect);
+  ASSERT_NE(law, found.candidates.end());
+  ASSERT_EQ(law->effect, "dahl_friction");
+  EXPECT_TRUE(law->admissible);
+  EXPECT_NE(law->note.find("around reversals"), std::string::npos);
+  for (const estimation::Estimate& e : law->parameters) {
+    if (e.parameter == "torque") EXPECT_NEAR(e.value, kFriction, 0.01 * kFriction);
+    if (e.parameter == "presliding") EXPECT_NEAR(e.value, kTravel, 0.05 * kTravel);
+  }
+  EXPECT_LT(law->rmse_cv_after, 0.3 * law->rmse_cv_before);
+  EXPECT_GT(law->chi2_decrease_percent, 90.0);
+  ASSERT_TRUE(law->evidence.has_value());
+}
+
+}  // namespace
+}  // namespace flexspline::selection::selection_presliding_fit_test
