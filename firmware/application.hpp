@@ -13,6 +13,7 @@
 #include <optional>
 #include <span>
 
+#include "firmware/angle_reference.hpp"
 #include "firmware/board.hpp"
 #include "firmware/commissioning_control.hpp"
 #include "firmware/control.hpp"
@@ -43,8 +44,7 @@ class Application {
     const control::Hardware hardware = hardware_of(board);
     most_command_ = control::most_command(hardware);
     most_reading_ = control::most_reading(hardware);
-    motor_encoder_ = hardware.motor_encoder;
-    output_encoder_ = hardware.output_encoder;
+    reference_.begin(hardware);
     commissioning_.begin(board);
   }
 
@@ -66,7 +66,7 @@ class Application {
     } else {
       estimate = {};
     }
-    if (has_parameters() && !is_armed(status_.mode)) keep_reference(readings, estimate);
+    if (has_parameters() && !is_armed(status_.mode)) reference_.update(control_, status_, readings, estimate);
     if ((due & kResidualMap) != 0 && status_.maps_residual && control_.has_residual())
       residual_map_.add(parameters().residual_map, estimate.velocity, estimate.angle, control_.residual());
     take_command(estimate);
@@ -160,7 +160,7 @@ class Application {
   // The same for background work, which the tick interrupts: a consistent copy.
   Status snapshot() const { return status_lock_.read(status_); }
   // What the encoders show at the zeros that `home` set, for a host that stores it.
-  control::StoredZero zero() const { return status_lock_.read(zero_); }
+  control::StoredZero zero() const { return status_lock_.read(reference_.zero()); }
   CommissioningOf<B>& commissioning() { return commissioning_; }
 
  private:
@@ -192,7 +192,7 @@ class Application {
     } else if (owner == Owner::tick && new_parameters_) {
       new_parameters_ = false;
       status_.has_parameters = true;
-      if (control_.restart()) forget_reference();
+      if (control_.restart()) reference_.forget(control_, status_);
       safety_ = {};
     }
   }
@@ -220,77 +220,6 @@ class Application {
   void block_done(BlockFinding finding) {
     block_step_ = BlockStep::none;
     block_finding_ = finding;
-  }
-
-  // Where the shafts are.
-
-  void forget_reference() {
-    finds_reference_ = true;
-    has_index_ = false;
-    zero_ = {};
-    set_reference(false, false);
-  }
-  void set_reference(bool turn, bool output) {
-    status_.knows_turn = turn;
-    status_.knows_output = output;
-    unknown_ = (turn ? 0U : 1U << 17) | (output ? 0U : 1U << 18);
-    control_.know(turn, output);
-  }
-  // While the drive is not armed, as a set point would refer to the old angle.
-  [[gnu::noinline]] void keep_reference(const Readings& readings, Estimate& estimate) {
-    const auto counts = static_cast<std::int32_t>(parameters().motor_encoder.counts);
-    // Counting was interrupted.
-    if (estimate.moved > counts || estimate.moved < -counts) lose_reference();
-    if (status_.mode != Mode::idle) return;
-    using control::SensorKind;
-    index_counter_ = readings.index_counter;
-    has_index_ = !finds_reference_ && readings.index_passes != index_passes_;
-    if (finds_reference_) {
-      finds_reference_ = false;
-      index_passes_ = readings.index_passes;
-      // A board that does not state its encoders is a simulated one, which starts at its zero.
-      const bool all = motor_encoder_ == SensorKind::not_stated;
-      const bool turn = all || motor_encoder_ == SensorKind::absolute;
-      const bool output = parameters().has_output_encoder && output_encoder_ == SensorKind::absolute;
-      control_.take_absolute(turn && !all, output);
-      if (output) control_.take_output(turn);
-      set_reference(turn, all || output);
-      control_.show_angles(estimate);
-    } else if (motor_encoder_ == SensorKind::indexed && !status_.knows_turn && readings.index_passes != index_passes_) {
-      control_.take_index(readings.index_counter);
-      set_reference(true, status_.knows_output);
-      control_.show_angles(estimate);
-    }
-  }
-  // A shaft may have turned without being counted. Absolute encoders give the angle once they are valid again.
-  void lose_reference() {
-    if (motor_encoder_ == control::SensorKind::not_stated || !has_parameters()) return;
-    if (motor_encoder_ == control::SensorKind::absolute) control_.begin_encoders();
-    forget_reference();
-  }
-  static constexpr bool loses_count(Fault fault) {
-    return fault == Fault::motor_encoder_stale || fault == Fault::motor_encoder_jump ||
-           fault == Fault::motor_encoder_stuck || fault == Fault::implausible_motion ||
-           fault == Fault::encoders_disagree;
-  }
-  Refusal home(const Command& command, const Estimate& estimate) {
-    if (status_.mode == Mode::boot) return Refusal::booting;
-    if (status_.mode == Mode::fault) return Refusal::fault;
-    if (is_armed(status_.mode)) return Refusal::armed;
-    if (!has_parameters()) return Refusal::no_parameters;
-    if (!at_rest() || N::magnitude(estimate.velocity) > parameters().safety.standstill) return Refusal::moving;
-    control_.set_angle(command.position);
-    finds_reference_ = false;
-    set_reference(true, true);
-    note_zero();
-    return Refusal::none;
-  }
-  // For a host that stores it: what the encoders show at the zeros that were just set.
-  void note_zero() {
-    using control::SensorKind;
-    const bool indexed = motor_encoder_ == SensorKind::indexed;
-    const SensorKind motor = indexed && !has_index_ ? SensorKind::none : motor_encoder_;
-    zero_ = control_.zero_now(motor, output_encoder_, indexed ? index_counter_ : 0);
   }
 
   // Commands.
@@ -365,6 +294,15 @@ class Application {
     safety_.begin_mode();
     return Refusal::none;
   }
+  Refusal home(const Command& command, const Estimate& estimate) {
+    if (status_.mode == Mode::boot) return Refusal::booting;
+    if (status_.mode == Mode::fault) return Refusal::fault;
+    if (is_armed(status_.mode)) return Refusal::armed;
+    if (!has_parameters()) return Refusal::no_parameters;
+    if (!at_rest() || N::magnitude(estimate.velocity) > parameters().safety.standstill) return Refusal::moving;
+    reference_.home(control_, status_, command.position);
+    return Refusal::none;
+  }
   void take_set_point(const Command& command) {
     safety_.note_set_point();
     demand_.mode = command.mode;
@@ -421,7 +359,7 @@ class Application {
     status_.fault = found;
     status_.mode = Mode::fault;
     amplifier_off();
-    if (loses_count(found.fault)) lose_reference();
+    if (AngleReference::is_lost_by(found.fault)) reference_.lose(control_, status_);
   }
   void enter_idle() {
     status_.mode = Mode::idle;
@@ -450,7 +388,7 @@ class Application {
 
   void record(const Readings& readings) {
     signals_.state = static_cast<std::uint32_t>(status_.mode) | (static_cast<std::uint32_t>(status_.fault.fault) << 8) |
-                     (signals_.output.limited ? 1U << 16 : 0U) | unknown_;
+                     (signals_.output.limited ? 1U << 16 : 0U) | reference_.unknown_bits();
     signals_.motor_counter = readings.motor_counter;
     telemetry_.record(status_.tick, signals_);
   }
@@ -458,26 +396,19 @@ class Application {
   B* board_ = nullptr;
   std::int32_t most_command_ = 0;  // as the board states it, a share of full scale; set by begin()
   std::int32_t most_reading_ = 0;
-  control::SensorKind motor_encoder_ = control::SensorKind::not_stated;
-  control::SensorKind output_encoder_ = control::SensorKind::not_stated;
-  bool finds_reference_ = false;
-  std::uint16_t index_passes_ = 0;  // at the last search for the angle
   SequenceLock status_lock_;
-  std::uint32_t unknown_ = 0;  // of the state's word: bit 17 the motor's turn, 18 the output
   Status status_{};
   Demand demand_{};
   Signals signals_{};
   Safety safety_{};
   Watchdog watchdog_{};
   Control control_{};
+  AngleReference reference_{};
   std::uint32_t rest_counter_ = 0;
   std::uint32_t rest_ticks_ = 0;
   std::uint32_t boot_ticks_ = 0;
   std::uint32_t stop_ticks_ = 0;
   bool reported_reset_ = false;
-  bool has_index_ = false;
-  std::uint32_t index_counter_ = 0;
-  control::StoredZero zero_{};
 
   Command command_{};
   Answer answer_{};
