@@ -81,9 +81,8 @@ class Application {
     watchdog_.report_tick();
     update_mode(output);
     record(readings);
-    // In a fault already, or stopping because of one: the first cause is kept.
-    if (board_->tick_overrun() && status_.mode != Mode::fault)
-      enter_fault(status_.mode == Mode::stop ? status_.fault : FaultRecord{Fault::tick_overrun, status_.tick, 0, 0});
+    if (board_->tick_overrun()) [[unlikely]]
+      note_overrun();
     status_lock_.end_write();
   }
 
@@ -135,10 +134,10 @@ class Application {
 
   // Changes the excitation: edit(coefficients, is torque). The tick reads it in mode `excitation` only, which it enters
   // only by a command from background work; so the tick need not release the parameters. Returns false and does nothing
-  // while the drive is armed, a command waits, or there are no parameters.
+  // while the drive is armed or its motor is measured, a command waits, or there are no parameters.
   template <class Edit>
   bool edit_excitation(Edit&& edit) {
-    if (is_armed(status_.mode) || command_waits_.load(std::memory_order_acquire) || !has_parameters()) return false;
+    if (is_live(status_.mode) || command_waits_.load(std::memory_order_acquire) || !has_parameters()) return false;
     edit(parameters().excitation, parameters().excites_torque);
     return true;
   }
@@ -185,7 +184,7 @@ class Application {
   // The tick's part: releases the parameters while no mode uses them, and restarts with the new ones.
   void release_or_take_parameters() {
     const Owner owner = load_in_tick(owner_);
-    if (owner == Owner::requested && !is_armed(status_.mode)) {
+    if (owner == Owner::requested && !is_live(status_.mode)) {
       status_.has_parameters = false;
       status_.maps_residual = false;  // in other bases the bins have another meaning
       owner_.store(Owner::background, std::memory_order_release);
@@ -325,12 +324,14 @@ class Application {
     if (found.fault == Fault::none && has_parameters())
       safety_.check(found, readings, estimate, signals_.output, parameters(), status_.mode, due,
                     [this] { return control_.streams_in_motion(); });
-    if (found.fault != Fault::none) {
+    if (found.fault != Fault::none) [[unlikely]] {
       found.tick = status_.tick;
       boot_ticks_ = 0;
-      return respond(found, estimate);
+      respond(found, estimate);
+    } else if (status_.mode == Mode::boot) {
+      boot();
     }
-    if (status_.mode == Mode::boot) boot();
+    // Also in a stop whose cause lasts.
     if (is_armed(status_.mode) && amplifier_tripped_of(*board_)) {
       const auto before = static_cast<std::int32_t>(status_.mode == Mode::stop ? status_.fault.fault : Fault::none);
       enter_fault({Fault::amplifier_fault, status_.tick, before, amplifier_fault_of(*board_)});
@@ -354,6 +355,12 @@ class Application {
     demand_ = {.mode = Mode::stop};
     stop_ticks_ = 0;
     control_.start(demand_, estimate);
+  }
+  // In a fault already, or stopping because of one: the first cause is kept.
+  [[gnu::noinline]] void note_overrun() {
+    ++status_.overruns;
+    if (status_.mode == Mode::fault) return;
+    enter_fault(status_.mode == Mode::stop ? status_.fault : FaultRecord{Fault::tick_overrun, status_.tick, 0, 0});
   }
   [[gnu::noinline]] void enter_fault(const FaultRecord& found) {
     status_.fault = found;

@@ -215,7 +215,9 @@ class Control {
   // The slow tasks of a tick.
   std::uint32_t due_at(std::uint32_t tick) const { return 1U << tick % kSlowTicks | every_tick_; }
 
-  // Enters an armed mode at the shaft's present angle and velocity. The torque continues without a jump.
+  // Enters an armed mode at the shaft's present angle and velocity. The torque continues without a jump, except into a
+  // mode whose set point is a torque: the integral of the velocity loop is set again, as the feedforward begins or
+  // ends.
   [[gnu::noinline]] void start(const Demand& demand, const Estimate& e) {
     const bool goes_on =
         uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
@@ -224,6 +226,7 @@ class Control {
                                                    control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
     }
     if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
+    loops_.mode = control::Mode::off;
     feedforward_ = {};
     nominal_ = {};
     torsion_ = {};
@@ -275,6 +278,7 @@ class Control {
         break;
       default:
         off();
+        out = {};
         return;
     }
     nominal_ = {};

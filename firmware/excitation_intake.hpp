@@ -8,6 +8,7 @@
 #include "firmware/messages.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/derived_fields.hpp"
+#include "shared/model/fields.hpp"
 #include "shared/protocol/payloads.hpp"
 
 namespace flexspline::firmware {
@@ -32,23 +33,17 @@ class ExcitationIntake {
 
  private:
   using Code = protocol::Code;
+  using Waveform = control::Excitation::Waveform<N>;
 
   template <class Application, class Edit>
   static Code edit(Application& application, Edit&& change) {
     if (application.edit_excitation(change)) return Code::done;
     const auto& status = application.status();
-    return is_armed(status.mode) ? Code::armed : status.has_parameters ? Code::busy : Code::no_parameters;
+    return is_live(status.mode) ? Code::armed : status.has_parameters ? Code::busy : Code::no_parameters;
   }
-  static bool is_limit(std::int32_t raw) { return raw > 0 && raw <= (std::int32_t{2} << fixed::kValueBits); }
-  static bool is_signal(std::int32_t raw) { return raw > INT32_MIN && (raw == 0 || is_limit(raw) || is_limit(-raw)); }
   // Only the normalised form is accepted, so that each number has one representation.
   static bool make_gain(std::int32_t mantissa, std::int32_t exponent, N::Gain& gain) {
-    const std::uint64_t size = fixed::size_of(mantissa);
-    const bool normal = mantissa == 0 ? exponent == 0
-                                      : size >= (std::uint64_t{1} << (fixed::kMantissaBits - 1)) &&
-                                            size <= (std::uint64_t{1} << fixed::kMantissaBits) &&
-                                            exponent >= N::Gain::kLeastExponent && exponent <= N::Gain::kMostExponent;
-    if (!normal) return false;
+    if (!model::detail::normal(mantissa, exponent, N::Gain::kLeastExponent, N::Gain::kMostExponent)) return false;
     gain = {};
     gain.mantissa = mantissa;
     gain.exponent = static_cast<std::int8_t>(exponent);
@@ -59,27 +54,24 @@ class ExcitationIntake {
   Code begin(Application& application, const protocol::Message& m) {
     protocol::Excitation e;
     if (const Code code = protocol::take_payload(m.content(), e); code != Code::done) return code;
-    constexpr std::int64_t kLargestRate = std::int64_t{4} << fixed::kStateBits;
-    const bool fits = e.ticks > 0 && e.fade_ticks <= e.ticks / 2 && is_signal(e.positive) && is_signal(e.negative) &&
-                      is_signal(e.offset) && is_limit(e.limit) && e.rate > 0 && e.rate <= kLargestRate &&
-                      (e.shape != control::Shape::lines || e.line_count > 0);
-    if (!fits) return Code::wrong_value;
+    Waveform w;
+    w.shape = e.shape;
+    w.line_count = e.line_count;
+    w.step = e.step;
+    w.step_change = e.step_change;
+    w.ticks = e.ticks;
+    w.fade_ticks = e.fade_ticks;
+    w.fade_step = e.fade_ticks > 1 ? fixed::detail::divided(~std::uint64_t{0}, e.fade_ticks) : 0;
+    w.positive = N::Value{{e.positive}};
+    w.negative = N::Value{{e.negative}};
+    w.offset = N::Value{{e.offset}};
+    w.limiter = {N::Value{{e.limit}}, N::State{{e.rate}}};
+    if (w.ticks == 0 || !control::Excitation::is_valid<N>(w)) return Code::wrong_value;
     ticks_ = 0;
     return edit(application, [&](auto& c, bool& is_torque) {
       is_torque = e.is_torque;
-      c.shape = e.shape;
-      c.guarded = false;
-      c.line_count = e.line_count;
-      c.step = e.step;
-      c.step_change = e.step_change;
+      static_cast<Waveform&>(c) = w;
       c.ticks = 0;
-      c.fade_ticks = e.fade_ticks;
-      c.fade_step = e.fade_ticks > 1 ? fixed::detail::divided(~std::uint64_t{0}, e.fade_ticks) : 0;
-      c.positive = N::Value{{e.positive}};
-      c.negative = N::Value{{e.negative}};
-      c.offset = N::Value{{e.offset}};
-      c.limiter.limit = N::Value{{e.limit}};
-      c.limiter.rate = N::State{{e.rate}};
       c.lines = {};
       ticks_ = e.ticks;
     });
@@ -88,16 +80,13 @@ class ExcitationIntake {
   Code guard(Application& application, const protocol::Message& m) {
     protocol::ExcitationGuard g;
     if (const Code code = protocol::take_payload(m.content(), g); code != Code::done) return code;
-    N::Gain slope{};
-    if (!is_limit(g.torque_limit) || !is_limit(g.overspeed) || g.largest_velocity <= 0 || g.slope_mantissa <= 0 ||
-        !make_gain(g.slope_mantissa, g.slope_exponent, slope))
+    control::SpeedGuard::Coefficients<N> guard{
+        N::Value{{g.torque_limit}}, N::Value{{g.overspeed}}, N::Value{{g.largest_velocity}}, {}};
+    if (!make_gain(g.slope_mantissa, g.slope_exponent, guard.slope) || !control::Excitation::is_valid_guard<N>(guard))
       return Code::wrong_value;
     return edit(application, [&](auto& c, bool&) {
       c.guarded = true;
-      c.guard.torque_limit = N::Value{{g.torque_limit}};
-      c.guard.overspeed = N::Value{{g.overspeed}};
-      c.guard.largest_velocity = N::Value{{g.largest_velocity}};
-      c.guard.slope = slope;
+      c.guard = guard;
     });
   }
   template <class Application>

@@ -49,7 +49,8 @@ struct Status {
   // Whether the motor's angle within its turn is known, and the output's (and with it the motor's number of turns).
   bool knows_turn = false;
   bool knows_output = false;
-  FaultRecord fault{};  // the present fault, or the last one
+  std::uint16_t overruns = 0;  // ticks that were too long, in any mode; it wraps
+  FaultRecord fault{};         // the present fault, or the last one
 };
 
 // A bin of the residual map. Its number (Application::map_bin) is 32 times the velocity bin plus the bin of the motor's

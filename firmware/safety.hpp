@@ -11,7 +11,8 @@ namespace flexspline::firmware {
 
 class Safety {
  public:
-  // Each writes the first fault into `found`, which has none yet; the caller adds the tick.
+  // Each writes the first fault into `found`, which has none yet; the caller adds the tick. A fault that switches off
+  // replaces one that ends in a controlled stop, whose cause may last as long as the stop.
 
   // Without parameters there are no scales and no limits: it only checks that samples arrive. `most_reading`: the
   // largest reading of the current, which no block can raise. `output_ticks()`: as long as a sample of the output may
@@ -69,7 +70,8 @@ class Safety {
       note(found, fault, static_cast<std::int32_t>(seen), static_cast<std::int32_t>(limit));
   }
   [[gnu::noinline]] static void note(FaultRecord& found, Fault fault, std::int32_t seen, std::int32_t limit) {
-    if (found.fault != Fault::none) return;
+    if (found.fault != Fault::none && (ends_in(found.fault) == SafeState::off || ends_in(fault) == SafeState::stop))
+      return;
     found.fault = fault;
     found.seen = seen;
     found.limit = limit;
@@ -122,7 +124,7 @@ class Safety {
     outside_ = (current_outside_ | temperature_outside_ | torque_outside_) != 0;
   }
   [[gnu::noinline]] void count_same_torque(FaultRecord& found, const Parameters& p) {
-    torque_same_ = torque_same_ < UINT16_MAX ? torque_same_ + 1U : 0U;
+    if (torque_same_ < UINT32_MAX) ++torque_same_;
     const std::uint32_t most = p.safety.torque_same_ticks;
     expect(found, Fault::torque_stuck, most == 0 || torque_same_ < most, torque_same_, most);
   }
@@ -216,9 +218,11 @@ class Safety {
     }
     const auto turned = static_cast<std::int32_t>(turned_);
     const std::int32_t most = limits.motor_counts;
-    expect(found, Fault::output_encoder_stuck, is_within(turned, most), turned, most);
+    const bool shows_motion = is_within(turned, most);
+    expect(found, Fault::output_encoder_stuck, shows_motion, turned, most);
     const bool is_due = !watches_ || (due & kTemperatureAndGear) != 0;
-    if (p.has_output_encoder && most > 0 && is_due) check_gear(found, e, p);
+    // Not for an encoder that failed already: the motor's, with which the drive stops, is intact.
+    if (shows_motion && p.has_output_encoder && most > 0 && is_due) check_gear(found, e, p);
   }
   // Since the drive was armed both encoders show the same motion, except for torsion and backlash. The reference
   // follows slowly, as the ratio is rounded in the parameters. An output that does not move is detected earlier.
@@ -285,7 +289,7 @@ class Safety {
     if (limits.ticks == 0 || lagging_ < limits.ticks) return;
     expect(found, Fault::following_error, false, lag, std::int64_t{window} * open / full);
   }
-  // The magnitude of an angle in 2^-16 turns, limited to 65536.
+  // The magnitude of an angle in 2^-16 turns, limited to 65536 turns.
   static std::uint32_t magnitude_word(std::int64_t angle) {
     const std::uint64_t size = fixed::size_of(angle);
     return (size >> 48) != 0 ? 0xFFFFFFFF : static_cast<std::uint32_t>(size >> 16);

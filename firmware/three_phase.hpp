@@ -86,7 +86,8 @@ class ThreePhaseStageOf {
   StageFault fault() const { return fault_; }
 
   // The motor that commissioning found; without pole pairs, or with another encoder than the board's, that with which
-  // the stage began. While the drive is not armed, and from background work: the interrupt reads none of these then.
+  // the stage began. While the drive is not armed, and from background work. The interrupt may meanwhile calibrate the
+  // zeros of the current sensors, with old and new gains: so they are measured again.
   void use(const control::MotorSettings& motor) {
     const bool is_found = motor.pole_pairs > 0 && motor.encoder_counts == made_.encoder_counts;
     s_.foc.sensors.gain = is_found ? motor.gain : made_.foc.sensors.gain;
@@ -95,7 +96,9 @@ class ThreePhaseStageOf {
     s_.reversed = is_found ? motor.reversed : made_.reversed;
     s_.offset_angle = is_found ? motor.offset_angle : made_.offset_angle;
     s_.pole_pairs = is_found ? static_cast<std::int32_t>(motor.pole_pairs) : made_.pole_pairs;
-    has_offsets_ = false;  // they are for the gains
+    // After the gains, also for the compiler.
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    has_offsets_ = false;
   }
   bool is_commissioned() const { return s_.pole_pairs > 0; }
   bool is_sampled() const { return began_; }
@@ -141,10 +144,19 @@ class ThreePhaseStageOf {
     commissioning_fault_ = in.bus > s_.most_bus ? StageFault::bus_high : cause;
     commissions_ = commissioning_fault_ == StageFault::none;
     if (!commissions_) return {};
+    heat(in.readings);
     if (!protection_.charge(s_.protection)) return {{}, true};
     const Switches out = commissioning_.update({in.readings, in.bus, angle_});
     commissions_ = !commissioning_.done();
     return commissions_ ? out : Switches{};
+  }
+  // For the thermal limit in command(): the magnitude of the current, all of it in d, of which the application sees
+  // nothing.
+  void heat(const control::foc::Phases& readings) {
+    const auto i = control::foc::clarke(control::foc::phase_currents(s_.foc.sensors, readings, 0));
+    out_.measured = {control::foc::detail::current_of(control::foc::detail::square_of(i.alpha) +
+                                                      control::foc::detail::square_of(i.beta)),
+                     0};
   }
   // Once it runs it goes on until it is switched off: offsets are measured without current.
   Switches run(const Inputs& in, StageFault cause) {
@@ -208,6 +220,8 @@ class ThreePhaseStageOf {
   void check_currents(const control::foc::Phases& readings) {
     const control::foc::Phases p = control::foc::phase_currents(s_.foc.sensors, readings, state_.unmeasured);
     if (control::commissioning::largest_size(p) > s_.most_phase) latch(StageFault::overcurrent);
+    // The current of a phase that is not sampled follows from the others: their sum says nothing.
+    if (state_.unmeasured != 0) return;
     const bool adds_up = control::commissioning::size(p.a + p.b + p.c) <= s_.most_sum;
     sum_periods_ = adds_up ? 0 : sum_periods_ + 1;
     if (sum_periods_ >= kSumPeriods) latch(StageFault::current_sum);

@@ -25,10 +25,14 @@ class UpdateWatch {
     const bool rests = !is_live(status.mode);
     dfu.allow(rests);
     // Correct means: two seconds of ticks without overrun, and a host that configured the device, as the next update
-    // needs one. An armed drive does not wait for flash memory.
+    // needs one. An armed drive does not wait for flash memory. The last fault does not show an overrun: a drive that
+    // is in another one keeps that.
     had_host_ = had_host_ || has_host;
-    const bool does_well = status.tick >= confirm_ticks_ && had_host_ && status.mode != Mode::boot &&
-                           status.fault.fault != Fault::tick_overrun;
+    if (status.overruns != overruns_) {
+      overruns_ = status.overruns;
+      last_overrun_ = status.tick;
+    }
+    const bool does_well = status.tick - last_overrun_ >= confirm_ticks_ && had_host_ && status.mode != Mode::boot;
     if (on_trial_ && rests && does_well) on_trial_ = !slots_.confirm();
     return rests && dfu.wants_loader();
   }
@@ -37,6 +41,8 @@ class UpdateWatch {
  private:
   Slots& slots_;
   std::uint32_t confirm_ticks_;
+  std::uint32_t last_overrun_ = 0;  // tick, as background work saw it
+  std::uint16_t overruns_ = 0;
   bool on_trial_ = false;
   bool had_host_ = false;
 };

@@ -60,9 +60,13 @@ class CoreBoard {
       return {};
     }
   }
-  // The flash memory stops the processor: the ticks after that begin late, which is not counted as an overrun. The
-  // service writes only while the amplifier is off.
-  void flash_works() { late_ticks_ = 2; }
+  // The flash memory stops the processor: the ticks after that begin late, which is not counted as an overrun. Each
+  // operation has all the time of the watchdog, as two sectors in a row may take longer. The service writes only while
+  // the amplifier is off.
+  void flash_works() {
+    late_ticks_ = 2;
+    if (!enabled_) watchdog_.feed(false);
+  }
 
  protected:
   template <class Encoder>

@@ -77,8 +77,9 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
       if (out.clears_driver) bridge_.clear();
     }
     if constexpr (Description::kStageParts.brake) Description::Brake::set(out.brake);
-    // What ends a step of commissioning may take longer: the voltage before stands for another period.
-    if (bridge_.is_late() && !measures) is_late_ = true;
+    // Late: the bottom has passed, or the next trigger, after which the timer counts down again. What ends a step of
+    // commissioning may take longer: the voltage before stands for another period.
+    if ((bridge_.is_late() || tim1::tick_is_due()) && !measures) late_periods_ = late_periods_ + 1;
     if (++samples_ % kPeriods == 0) cortex_m4::request_tick();
   }
   void watch() {
@@ -117,13 +118,12 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
   }
   bool amplifier_tripped() const { return stage_.tripped(); }
   protocol::StageFault amplifier_fault() const { return stage_.fault(); }
-  // The next tick is due already, or the current loop did not end within its half of a period.
+  // The next tick is due already, or a current loop since the last tick did not end within its half of a period.
   bool tick_overrun() {
-    if (Core::was_delayed()) {
-      is_late_ = false;
-      return false;
-    }
-    return is_late_ || cortex_m4::tick_is_requested();
+    const std::uint32_t late = late_periods_;
+    const bool was_late = late != late_before_;
+    late_before_ = late;
+    return !Core::was_delayed() && (was_late || cortex_m4::tick_is_requested());
   }
 
  private:
@@ -150,7 +150,8 @@ class ThreePhaseBoard : public CoreBoard<Description, 10'000> {
   volatile std::uint32_t samples_ = 0;
   volatile std::uint32_t motor_samples_ = 0;
   volatile std::int32_t temperature_ = 0;
-  volatile bool is_late_ = false;
+  volatile std::uint32_t late_periods_ = 0;
+  std::uint32_t late_before_ = 0;  // at the last tick
   std::uint32_t counter_ = 0;
   std::uint32_t missed_ = 0;
   std::uint32_t dead_periods_ = 0;

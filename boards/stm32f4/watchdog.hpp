@@ -2,7 +2,7 @@
 // switches (RM0090, 21). Once started it cannot be stopped.
 //
 // Its oscillator has 17 to 47 kHz. While the amplifier is on, the limit is kWatchdogTicks even for the slowest; while
-// it is off the limit is some seconds, as erasing a sector stops the processor for up to half of one.
+// it is off the limit is some seconds, as erasing a sector of 128 KB stops the processor for up to two.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class IndependentWatchdog {
     hardware(kIwdg) = kStart;
     set_limit(false);
   }
-  // From background work, when every part has reported.
+  // From background work, when every part has reported, and around each operation of the flash memory.
   void feed(bool amplifier_on) {
     if (amplifier_on != short_) set_limit(amplifier_on);
     hardware(kIwdg) = kFeed;

@@ -150,12 +150,7 @@ struct FeedforwardSection : SectionOf<Section::feedforward, Feedforward::Coeffic
 };
 struct ExcitationSection : SectionOf<Section::excitation, Excitation::Waveform<Numbers>> {
   static constexpr auto& data(auto& settings) { return base_of<Data>(settings.excitation); }
-  static bool agrees(const Data& c, SectionValues&) {
-    const auto positive = [](Numbers::Value x) { return x > Numbers::Value{}; };
-    const auto& g = c.guard;
-    if (c.guarded && !(positive(g.torque_limit) && positive(g.overspeed) && positive(g.largest_velocity))) return false;
-    return c.fade_ticks <= c.ticks / 2 && c.limiter.rate.raw > 0;
-  }
+  static bool agrees(const Data& c, SectionValues&) { return Excitation::is_valid<Numbers>(c); }
 };
 // Up to kMostLines lines, one after the other.
 struct ExcitationLinesSection : SectionOf<Section::excitation_lines, Excitation::DriveLine<Numbers>> {
@@ -346,6 +341,7 @@ model::BlockVerdict check_for_drive(std::span<const std::uint8_t> block, std::ui
   if (general.has_torque_sensor) needed |= detail::kWithTorqueSensor;
   if ((needed & ~sections.seen) != 0) return {model::BlockFault::missing_section};
   if (general.tick_hz != tick_hz) return {model::BlockFault::other_tick_rate};
+  values.limited.tick_hz = tick_hz;
   if (unreachable(values.limited) != Limit::none) return {model::BlockFault::unreachable_limit};
   if (values.motor_counts_of_stage != 0 && values.motor_counts_of_stage != values.motor_counts)
     return {model::BlockFault::unlike_coefficients};

@@ -101,6 +101,22 @@ struct Excitation {
     return c;
   }
 
+  // Whether every sum of its numbers stays in range. For what comes in a block and for what a host sends; of the
+  // drive's own number system.
+  template <class N>
+  static constexpr bool is_valid(const Waveform<N>& c) {
+    const std::int64_t largest_rate = 4 * N::widen(N::one()).raw;
+    const auto is_signal = [](const typename N::Value& x) { return x.raw >= -two<N>() && x.raw <= two<N>(); };
+    return c.fade_ticks <= c.ticks / 2 && is_signal(c.positive) && is_signal(c.negative) && is_signal(c.offset) &&
+           is_limit<N>(c.limiter.limit) && c.limiter.rate.raw > 0 && c.limiter.rate.raw <= largest_rate &&
+           (c.shape != Shape::lines || c.line_count > 0) && (!c.guarded || is_valid_guard<N>(c.guard));
+  }
+  template <class N>
+  static constexpr bool is_valid_guard(const SpeedGuard::Coefficients<N>& g) {
+    return is_limit<N>(g.torque_limit) && is_limit<N>(g.overspeed) && g.largest_velocity.raw > 0 &&
+           g.slope.mantissa > 0;
+  }
+
   template <class N>
   static constexpr void start(State<N>& s, const Coefficients<N>& c) {
     s = {0, 0, c.step, s.limiter, true};
@@ -134,6 +150,14 @@ struct Excitation {
   }
 
  private:
+  template <class N>
+  static constexpr std::int32_t two() {
+    return (N::one() + N::one()).raw;
+  }
+  template <class N>
+  static constexpr bool is_limit(const typename N::Value& x) {
+    return x.raw > 0 && x.raw <= two<N>();
+  }
   // The phase after k ticks is that of the continuous chirp, f k + (f_end - f) k^2 / (2 ticks).
   template <class N, class P>
   static void add_chirp(Coefficients<N>& c, const ExcitationSetup<P>& setup, const P& tick_s) {

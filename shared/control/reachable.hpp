@@ -1,5 +1,6 @@
-// One rule for all limits that stop a drive: each has to be within the range of its signal, with a margin. A limit
-// beyond that range does not protect. The host checks this when it packs, and the drive's validator as well.
+// One rule for all limits that stop a drive: each has to be within the range of its signal, with a margin, and the
+// times without a host and of a controlled stop have a largest value. A limit beyond that does not protect. The host
+// checks this when it packs, and the drive's validator as well.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +30,12 @@ enum class Limit : std::uint8_t {
   current_mismatch,
   standstill,
   following_velocity,
+  host_time,
+  stop_time,
 };
+
+// Largest times. A host that is silent for longer is not connected; a controlled stop that takes longer has failed.
+inline constexpr std::uint32_t kLongestHostSeconds = 5, kLongestStopSeconds = 30;
 
 // The signals and limits of the rule.
 struct Limited {
@@ -42,6 +48,7 @@ struct Limited {
   Shown torque_limit{};
   Shown current_limit{};
   N::Gain acceleration_scale{};  // of the motor's encoder filter
+  std::uint32_t tick_hz = 0;
 
   static Limited of(const DriveSettings<N>& s) {
     return {s.current,
@@ -51,7 +58,8 @@ struct Limited {
             s.loops.velocity_limit,
             s.loops.torque_limit,
             s.loops.current_limit,
-            s.motor_motion.acceleration_scale};
+            s.motor_motion.acceleration_scale,
+            s.tick_hz};
   }
 };
 
@@ -102,6 +110,8 @@ inline Limit unreachable(const Limited& d) {
   if (beyond(Limit::current_mismatch, d.safety.current_mismatch)) return Limit::current_mismatch;
   if (beyond(Limit::standstill, d.safety.standstill)) return Limit::standstill;
   if (beyond(Limit::following_velocity, d.following_velocity)) return Limit::following_velocity;
+  if (d.safety.host_ticks > kLongestHostSeconds * d.tick_hz) return Limit::host_time;
+  if (d.safety.stop_ticks > kLongestStopSeconds * d.tick_hz) return Limit::stop_time;
   return Limit::none;
 }
 

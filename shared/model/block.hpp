@@ -114,7 +114,7 @@ enum class BlockFault : std::uint8_t {
   missing_section,
   other_tick_rate,
   armed,              // valid, but the drive is armed
-  unreachable_limit,  // of a protection: its signal cannot show that it is exceeded
+  unreachable_limit,  // of a protection: its signal cannot show that it is exceeded, or its time is too long
   other_hardware,     // full scales, currents or sensors are not those of this board
 };
 // Where a block is invalid: the entry (from zero; the header is -1), and the field in it if one is the cause.

@@ -52,7 +52,8 @@ constexpr const char* text_of(BlockFault fault) {
     case BlockFault::armed:
       return "parameters cannot change while the drive is armed; disarm it first";
     case BlockFault::unreachable_limit:
-      return "a limit of [faults] is beyond what its signal can show; pack the block again, which says which one";
+      return "a limit of [faults] is beyond what its signal can show, or a time there is too long; pack the block "
+             "again, which says which one";
     case BlockFault::other_hardware:
       return "full scales, largest current or sensors in it are not those of this board; pack it again with "
              "--for-drive, which takes them from the drive";

@@ -12,7 +12,7 @@ namespace flexspline::storage {
 inline constexpr std::size_t kSectors = 2;
 inline constexpr std::uint32_t kErasedWord = 0xFFFFFFFF;
 
-// Calls wait until the memory is ready. An erase may take a second, during which nothing runs from a memory with one
+// Calls wait until the memory is ready. An erase may take two seconds, during which nothing runs from a memory with one
 // bank: the store erases only at its user's request, and the user makes sure that the drive is not armed.
 template <class F>
 concept FlashPort = requires(F flash, const F& memory, std::size_t sector, std::size_t word, std::uint32_t value) {

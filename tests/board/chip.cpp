@@ -66,6 +66,7 @@ Stop Chip::period() {
   }
   if (tim1.triggers_by_compare4() && !converter_is_dead) converter.trigger();
   tim1.counts_down = !loop_is_late;
+  if (loop_takes_a_period) tim1.reach_compare4();
   if (converter.interrupts() && machine.interrupt_is_enabled(kConverted)) {
     const std::uint64_t before = machine.instructions();
     const Stop stop = machine.interrupt(16 + kConverted);

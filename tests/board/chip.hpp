@@ -64,6 +64,7 @@ class Chip {
   GateDriverModel spi3{machine, [this] { return !ports[2].high(13); }, [this] { return ports[1].high(12); }};
   AngleSensorOnI2c i2c1{machine};
   bool converter_is_dead = false, timer_is_dead = false, loop_is_late = false;
+  bool loop_takes_a_period = false;  // the current loop: it ends after the timer's next top
   // The next period, with its current loop, comes after so many instructions of a tick; zero: after its end.
   std::uint64_t interrupts_tick_after = 0;
   int interrupted_ticks = 0;

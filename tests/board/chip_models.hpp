@@ -103,6 +103,7 @@ class FlashModel : public Peripheral {
   std::vector<std::uint8_t> bytes;
   std::uint32_t error = 0;  // what the next operation ends with (SR)
   int erases = 0, programs = 0;
+  std::function<void()> erased;  // at the end of each
   // OPTCR, as delivered: no brown-out reset. Read-out protection of level 2 lets nothing be changed.
   std::uint32_t options = 0x0FFFAAED;
   bool options_are_final = false;
@@ -228,6 +229,7 @@ class FlashModel : public Peripheral {
     }
     if (erasing_) {
       ++erases;
+      if (erased) erased();
       std::fill_n(bytes.begin() + sector_.offset, sector_.bytes, std::uint8_t{0xFF});
     } else {
       ++programs;

@@ -109,6 +109,35 @@ TEST(BoardStage, ACurrentLoopThatEndsAfterTheTimersBottomIsAnOverrun) {
   bench.chip.periods(4);
   bench.chip.loop_is_late = false;
   EXPECT_EQ(protocol::fault_text(bench.status().fault).name, "tick_overrun");
+  // The cause is gone: the fault can be cleared.
+  EXPECT_EQ(bench.command({.kind = protocol::CommandKind::clear_fault}), protocol::Refusal::none);
+  bench.chip.periods(300);
+  EXPECT_EQ(bench.status().mode, Mode::idle);
+  bench.expect_no_violation();
+}
+
+// The timer counts down again, as in a loop that is in time.
+TEST(BoardStage, ACurrentLoopThatTakesAWholePeriodIsAnOverrun) {
+  NucleoBench bench;
+  bench.come_up();
+  bench.chip.loop_takes_a_period = true;
+  bench.chip.periods(4);
+  bench.chip.loop_takes_a_period = false;
+  EXPECT_EQ(protocol::fault_text(bench.status().fault).name, "tick_overrun");
+}
+
+// Two sectors of 128 KB, each of which may take two seconds, are longer than the watchdog's longest time.
+TEST(BoardStage, AFactoryResetOfASlowFlashMemoryIsNotEndedByTheWatchdog) {
+  NucleoBench bench;
+  Chip& chip = bench.chip;
+  chip.watchdog.oscillator_hz = 47'000;
+  chip.flash.erased = [&] { chip.watchdog.pass(2.0); };
+  bench.come_up();
+  ASSERT_LT(chip.watchdog.limit_s(), 4.0);
+  EXPECT_EQ(bench.ask(Kind::block_erase_all, protocol::Empty{}).code, 0);
+  EXPECT_EQ(chip.flash.erases, 2);
+  EXPECT_FALSE(chip.watchdog.bit) << "a reset in the middle of the operation";
+  bench.expect_no_violation();
 }
 
 TEST(BoardStage, TheImageMeasuresAMotorThatNothingIsKnownOf) {

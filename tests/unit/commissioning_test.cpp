@@ -81,6 +81,30 @@ TEST(Commissioning, SwitchesOffAtOnceWhereACurrentPassesItsLimit) {
   EXPECT_FALSE(control.update({}).enabled) << "it stays off";
 }
 
+// All low sides on short-circuit a rotor that something turns.
+TEST(Commissioning, SwitchesOffAtOnceWhereARotorThatIsDrivenMakesACurrentBeforeTheFirstVoltage) {
+  const Bench b;
+  const auto settings = deployment::commissioning_settings(setup_of(b));
+  for (const int period : {0, 1, 500, 1200}) {
+    commissioning::Commissioning control;
+    control.begin(settings);
+    commissioning::Inputs in;
+    in.bus = 26214;
+    for (int k = 0; k < period; ++k) ASSERT_TRUE(control.update(in).enabled);
+    in.readings = {-8000, 16000, -8000};  // 19.5 A of 40
+    EXPECT_FALSE(control.update(in).enabled) << period;
+    EXPECT_NE(control.result().fault, Fault::none);
+    EXPECT_EQ(control.result().phase, 2);
+  }
+  // The zero of a sensor may be off by its limit and is measured in these periods.
+  commissioning::Commissioning control;
+  control.begin(settings);
+  commissioning::Inputs in;
+  in.bus = 26214;
+  in.readings = {settings.offsets.offset - 1, 0, 0};
+  for (int k = 0; k < 500; ++k) ASSERT_TRUE(control.update(in).enabled);
+}
+
 TEST(Commissioning, WithTwoSensorsMeasuresTheSameMotor) {
   std::mt19937_64 random(8);
   Bench b = random_bench(random);

@@ -250,6 +250,11 @@ TEST_F(DriveBlock, NumbersThatContradictEachOtherAreRefused) {
   // Fades longer than the excitation; a guard without a limit.
   expect_unlike(Section::excitation, 32, 10'001, 4);
   expect_unlike(Section::excitation, 68, 0, 4);
+  // Amplitudes and limits of the guard beyond two bases: the sum of two would leave the range of a value.
+  for (const std::size_t place : {56, 60, 64})
+    for (const std::int64_t number : {(std::int64_t{1} << 28) + 1, -(std::int64_t{1} << 28) - 1})
+      expect_unlike(Section::excitation, place, number, 4);
+  for (const std::size_t place : {68, 72}) expect_unlike(Section::excitation, place, (std::int64_t{1} << 28) + 1, 4);
   expect_unlike(Section::residual_map, 4, 1, 4);
 }
 

@@ -246,6 +246,46 @@ TEST(Fault, ASecondFaultWhileStoppingSwitchesOffAtOnce) {
   EXPECT_FALSE(drive->last().actuation.enabled);
 }
 
+// Some causes of a controlled stop last as long as the stop: their fault is found again in each tick of it.
+TEST(Fault, WhileTheCauseOfAStopLastsEveryFaultThatSwitchesOffIsStillFound) {
+  const std::pair<Fault, std::function<void(VirtualDrive&)>> first_causes[] = {
+      {Fault::overtemperature, [](VirtualDrive& drive) { drive.rig().set_temperature(95.0); }},
+      {Fault::temperature_out_of_range, injected(Injection::temperature_out_of_range)},
+      {Fault::torque_stuck, injected(Injection::torque_stuck)}};
+  const std::pair<Fault, std::function<void(VirtualDrive&)>> second_causes[] = {
+      {Fault::motor_encoder_stale, injected(Injection::motor_encoder_stale)},
+      {Fault::motor_encoder_jump, injected(Injection::motor_encoder_jump)},
+      {Fault::current_out_of_range, injected(Injection::current_out_of_range)},
+      {Fault::overcurrent, injected(Injection::current_surge)},
+      {Fault::amplifier_fault, [](VirtualDrive& drive) { software(drive).trip_amplifier(true); }}};
+  for (const auto& [first, begin] : first_causes) {
+    for (const auto& [second, add] : second_causes) {
+      const auto drive = idle_drive();
+      drive->command(arm_velocity(150.0));
+      run_with_host(*drive, 0.5);
+      begin(*drive);
+      for (int k = 0; k < 4000 && drive->status().mode != Mode::stop; ++k) run_with_host(*drive, 1.0 / kTickHz);
+      ASSERT_EQ(drive->status().mode, Mode::stop) << name_of(first);
+      ASSERT_EQ(drive->status().fault.fault, first);
+      add(*drive);
+      drive->run(firmware::info_of(second).ticks + 1);
+      EXPECT_EQ(drive->status().mode, Mode::fault) << name_of(first) << ", then " << name_of(second);
+      EXPECT_EQ(name_of(drive->status().fault.fault), name_of(second)) << "after " << name_of(first);
+      EXPECT_FALSE(drive->last().actuation.enabled);
+    }
+  }
+}
+
+TEST(Fault, ATorqueSensorThatIsStuckForLongCannotBeCleared) {
+  const auto drive = idle_drive();
+  drive->rig().inject(Injection::torque_stuck);
+  drive->run((1U << 16) + 10);
+  ASSERT_EQ(name_of(drive->status().fault.fault), "torque_stuck");
+  drive->command(of_kind(Command::Kind::clear_fault));
+  drive->run(100);
+  EXPECT_EQ(drive->status().mode, Mode::fault);
+}
+
 TEST(Fault, IsClearedOnlyWhereItsCauseIsGone) {
   const auto drive = idle_drive();
   drive->command(arm_velocity(60.0));

@@ -131,6 +131,44 @@ TEST(Modes, BetweenArmedModesTheShaftGoesOnWithoutAJump) {
   EXPECT_NEAR(drive->rig().truth().motor_angle / kTurn, target, 3e-3);
 }
 
+// The feedforward of the model ends with the mode that had it; the loops take its torque over in the same tick.
+TEST(Modes, WhereTheFeedforwardEndsTheCurrentDoesNotJump) {
+  const auto compensated = [](VirtualDrive& drive) {
+    Command c = arm_velocity(120.0);
+    c.compensate = true;
+    EXPECT_EQ(drive.command(c).refusal, Refusal::none);
+    run_with_host(drive, 0.5);
+    return drive.last().actuation.current;
+  };
+  const auto again = idle_drive();
+  const int before = compensated(*again);
+  EXPECT_GT(before, 2000) << "the drive has enough friction to show it";
+  again->command(arm_velocity(120.0));
+  EXPECT_NEAR(again->last().actuation.current, before, 0.2 * before) << "armed again without compensation";
+  const auto hot = idle_drive();
+  compensated(*hot);
+  hot->rig().set_temperature(95.0);
+  int last = 0;
+  for (int k = 0; k < 1000 && hot->status().mode != Mode::stop; ++k) {
+    last = hot->last().actuation.current;
+    run_with_host(*hot, 1.0 / kTickHz);
+  }
+  ASSERT_EQ(hot->status().mode, Mode::stop);
+  EXPECT_NEAR(hot->last().actuation.current, last, 0.2 * last) << "a controlled stop";
+}
+
+TEST(Modes, NoOutputIsLeftOfAnArmedTickWhereTheNextOneIsNotArmed) {
+  const auto control = std::make_unique<firmware::Control>();
+  firmware::Output out;
+  out.torque = out.current = out.error = N::value(0.5);
+  out.limited = out.at_rest = out.finished = true;
+  control->update({.mode = Mode::idle}, {}, 0, out);
+  EXPECT_EQ(out.torque, N::Value{});
+  EXPECT_EQ(out.current, N::Value{});
+  EXPECT_EQ(out.error, N::Value{});
+  EXPECT_FALSE(out.limited || out.at_rest || out.finished);
+}
+
 TEST(Modes, TheExcitationRunsToItsEndAndLeavesTheDriveIdle) {
   auto setup = demo_setup();
   control::ExcitationSetup<double> e;

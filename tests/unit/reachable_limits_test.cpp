@@ -43,6 +43,24 @@ TEST(ReachableLimits, PackSaysWhichLimitOfASettingOrOfADefaultNoSignalCanReach) 
   expect_told(packed("[faults]\nfollowing_velocity_rad_s = 300\n"), {"following_velocity_rad_s"});
 }
 
+// With a time that is too long a silent host, or a stop that does not end, would have no effect.
+TEST(ReachableLimits, TimesUntilTheDriveStopsByItselfAreBounded) {
+  EXPECT_EQ(packed("[faults]\nhost_s = 5\nstop_s = 30\n"), "taken");
+  expect_told(packed("[faults]\nhost_s = 5.1\n"), {"host_s"});
+  expect_told(packed("[faults]\nstop_s = 31\n"), {"stop_s"});
+  const auto finding = [](double host_s, double stop_s) {
+    auto setup = demo_setup();
+    setup.safety.host_s = host_s;
+    setup.safety.stop_s = stop_s;
+    const Block block(board::parameters_of(demo_drive(), setup), demo_constants());
+    return firmware::check_block(block.bytes(), kTickHz);
+  };
+  EXPECT_EQ(finding(5.0, 30.0), BlockFinding::none);
+  EXPECT_EQ(finding(5.001, 30.0), BlockFinding::unreachable_limit);
+  EXPECT_EQ(finding(5.0, 30.001), BlockFinding::unreachable_limit);
+  EXPECT_EQ(finding(3600.0, 1.0), BlockFinding::unreachable_limit);
+}
+
 TEST(ReachableLimits, TheDriveRefusesABlockWithALimitThatItsSignalCannotReach) {
   const auto finding = [](auto&& change) {
     auto setup = demo_setup();

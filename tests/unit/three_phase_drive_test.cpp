@@ -135,6 +135,30 @@ TEST(ThreePhaseDrive, SwitchesItsStageOffWithinTheStatedPeriodsUntilItIsDisarmed
   }
 }
 
+// Where the voltage is at its limit some periods have a phase that is not sampled: its current is what the others
+// leave, and their sum is zero whatever flows.
+TEST(ThreePhaseDrive, CurrentsThatDoNotAddUpAreFoundThoughSomePeriodsSampleTwoPhases) {
+  firmware::ThreePhaseStage stage;
+  auto settings = three_phase_settings_of(plant::demo_plant().drive);
+  settings.protection.winding = {};
+  settings.most_phase = INT32_MAX;
+  stage.begin(settings);
+  std::uint32_t counter = 0;
+  const auto step = settings.encoder_counts / static_cast<std::uint32_t>(settings.pole_pairs) / 9;
+  const auto update = [&](const control::foc::Phases& readings) { return stage.update({readings, 26'214, counter}); };
+  for (int k = 0; k < 1100; ++k) update({});
+  stage.command({20'000, true});
+  // A current that the loop cannot reach leads to the limit of the voltage, at an angle that turns.
+  for (int k = 0; k < 400; ++k, counter += step) ASSERT_TRUE(update({}).enabled);
+  int periods = 0;
+  while (periods < 400 && update({4'000, 4'000, 4'000}).enabled) {
+    ++periods;
+    counter += step;
+  }
+  EXPECT_EQ(stage.fault(), firmware::StageFault::current_sum);
+  EXPECT_LT(periods, 32) << "four that sample three phases";
+}
+
 // Errors of the whole drive in closed loop, with its own amplifier as the reference.
 TEST(ThreePhaseDrive, FollowsAMotionAsADriveWithAServoAmplifier) {
   ScenarioPlan plan;
@@ -170,6 +194,31 @@ deployment::CommissioningSetup commissioning_of(const ThreePhaseParameters& p) {
   s.current_a = 3.5;
   s.bus_v = p.inverter.supply_v;
   return s;
+}
+
+// The current of commissioning heats the winding as any other: a drive that is armed afterwards has less of its peak.
+TEST(ThreePhaseDrive, TheCurrentOfCommissioningCountsForTheThermalLimit) {
+  const plant::Drive drive = plant::demo_plant().drive;
+  auto settings = three_phase_settings_of(drive);
+  settings.limits.continuous_square = settings.limits.peak_square / 2;
+  settings.limits.start_square = settings.limits.peak_square / 10;
+  settings.limits.fade = 81'920;  // half of the peak's square over four tenths of it
+  settings.limits.heating = static_cast<std::uint32_t>((std::uint64_t{1} << 32) / 4'000);
+  const auto peak_a = [&](bool commissions) {
+    ThreePhaseAmplifier amplifier(drive, 20'000, 1);
+    amplifier.stage().begin(settings);
+    for (int k = 0; k < 600; ++k) amplifier.run({}, 0.0, 0.0);
+    if (commissions)
+      amplifier.stage().commission(deployment::commissioning_settings(commissioning_of(three_phase_of(drive))));
+    for (int k = 0; k < 40'000 && amplifier.stage().commissions(); ++k) amplifier.run({}, 0.0, 0.0);
+    amplifier.stage().stop_commissioning();
+    for (int k = 0; k < 600; ++k) amplifier.run({}, 0.0, 0.0);
+    for (int k = 0; k < 60; ++k) amplifier.run({32'000, true}, 0.0, 0.0);
+    return amplifier.current_a();
+  };
+  const double cold = peak_a(false), warm = peak_a(true);
+  EXPECT_NEAR(cold, 32.0 / 32.768 * scales_of(drive).amplifier_a, 0.05);
+  EXPECT_LT(warm, 0.85 * cold);
 }
 
 // On the drive's own mechanical plant: gear, friction, torsion, load.

@@ -14,6 +14,7 @@
 #include "host/drive_link/deployment/statics.hpp"
 #include "host/physics/catalogue/constants.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
+#include "shared/control/reachable.hpp"
 #include "shared/fixed/turn.hpp"
 
 namespace flexspline::deployment {
@@ -394,8 +395,8 @@ void take_faults(Settings& s, control::DriveSetup<double>& setup, const Basis& b
   f.mismatch_s = s.positive("faults", "mismatch_s", f.mismatch_s, 3.0);
   f.torque_same_s = s.positive("faults", "torque_same_s", f.torque_same_s, 3.0);
   f.standstill = s.positive("faults", "standstill_rad_s", 5e-3 * d.velocity_base);
-  f.host_s = s.positive("faults", "host_s", f.host_s, 3600.0);
-  f.stop_s = s.positive("faults", "stop_s", f.stop_s, 3600.0);
+  f.host_s = s.positive("faults", "host_s", f.host_s, control::kLongestHostSeconds);
+  f.stop_s = s.positive("faults", "stop_s", f.stop_s, control::kLongestStopSeconds);
   // Twice where the position loop asks for all of the velocity: it no longer follows but catches up.
   const double farthest = 30'000.0 * d.angle_base;
   f.following_error = s.positive("faults", "following_error_rad",

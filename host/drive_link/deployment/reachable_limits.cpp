@@ -41,6 +41,12 @@ void require_reachable(const control::DriveSettings<fixed::Fixed>& s, const Driv
          "lower it; where the model's friction asks for it, the drive is too weak for its friction");
   if (limit == Limit::current_mismatch) tell("current_mismatch_a", f.current_mismatch, d.current_base, "A", "lower it");
   if (limit == Limit::standstill) tell("standstill_rad_s", f.standstill, d.velocity_base, "rad/s", "lower it");
+  const auto tell_time = [&](const char* key, std::uint32_t ticks, std::uint32_t longest) {
+    throw PackError(fmt::format("{}: [faults] {} is {:.4g} s, but a drive takes at most {} s; lower it", origin, key,
+                                ticks * d.time_base, longest));
+  };
+  if (limit == Limit::host_time) tell_time("host_s", f.host_ticks, control::kLongestHostSeconds);
+  if (limit == Limit::stop_time) tell_time("stop_s", f.stop_ticks, control::kLongestStopSeconds);
   tell("following_velocity_rad_s", s.following.velocity, d.velocity_base, "rad/s", "lower it");
 }
 

@@ -56,6 +56,7 @@ class Commissioning {
   static constexpr std::int32_t kSumPeriods = 4;  // in a row
   static constexpr int kGroundBits = 10;          // periods from low to half
   static constexpr std::int32_t kStillPeriods = 2048;
+  static constexpr std::int32_t kWholeGain = 4096;  // of an exact sensor
 
   constexpr void check_limits() {
     const Settings& s = c_.settings;
@@ -64,9 +65,13 @@ class Commissioning {
     travel_ += c_.now.moved;
     const std::int64_t travel = travel_ >> 16;
     if (travel > s.most_travel || travel < -s.most_travel) c_.fail(Fault::too_far);
-    if (step_ <= Step::short_to_ground) return;
     const foc::Phases& p = c_.now.phases;
     const std::int32_t most = largest_size(p), least = smallest_size(p);
+    // With all low sides on a rotor that something turns is short-circuited. The zeros of the sensors are not known
+    // yet.
+    if (step_ <= Step::offsets && most > s.most_current + s.offsets.offset * kWholeGain)
+      c_.fail(Fault::current_flows, largest_phase(p));
+    if (step_ <= Step::short_to_ground) return;
     if (most > s.most_current) {
       // A voltage along a phase puts half of its current in each of the others.
       if (step_ == Step::resistance && 4 * least < most)
