@@ -1,10 +1,10 @@
 // The application of a drive, for any board: modes, the control tick, and background work.
 //
-//   main() -> Application::tick(), from the board's timer -> Control::observe() and Control::update()
+//   the timer's interrupt -> Drive::tick() of the board -> Application::tick() -> Control::observe(), Control::update()
 //
 // The tick interrupts background work, never the other way round. The state of the drive belongs to the tick; a command
-// waits in a mailbox for the next tick. Only the parameters are written by background work: it requests them, and the
-// tick releases them only while the amplifier is off.
+// waits in a mailbox for the next tick. Parameters are written by background work: as a whole after the tick released
+// them, which it does only while the amplifier is off; the excitation alone while the drive is not armed.
 #pragma once
 
 #include <atomic>
@@ -78,7 +78,7 @@ class Application {
       output = {};
     }
     board_->actuate(actuation(output));
-    watchdog_.report_tick();
+    watchdog_.report(Part::tick);
     update_mode(output);
     record(readings);
     if (board_->tick_overrun()) [[unlikely]]

@@ -1,4 +1,4 @@
-// The boot loader for any board: starts the application, or receives a new one over USB. README.md says how a board
+// The boot loader for any board: starts the application, or receives a new one over USB. boards/stm32f4/loader.hpp
 // uses it.
 #pragma once
 

@@ -14,7 +14,8 @@ namespace flexspline::firmware {
 
 struct FaultInfo {
   Fault fault = Fault::none;
-  std::uint32_t ticks = 0;  // from the first tick with the cause; zero: a parameter, named in the reason
+  std::uint32_t ticks = 0;            // from the first tick with the cause; zero: there is no fixed number
+  std::string_view time_parameter{};  // that states the time; empty: fixed ticks, or no time but a level or an angle
   std::string_view name{};
   std::string_view reason{};
 };
@@ -47,7 +48,26 @@ constexpr FaultInfo fault_info(Fault fault) {
         return 0;
     }
   };
-  return {fault, ticks(), text.name, text.reason};
+  const auto time_parameter = [fault]() -> std::string_view {
+    switch (fault) {
+      case Fault::motor_encoder_stuck:
+        return "stuck_s";
+      case Fault::torque_stuck:
+        return "torque_same_s";
+      case Fault::current_mismatch:
+        return "mismatch_s";
+      case Fault::host_lost:
+      case Fault::set_point_lost:
+        return "host_s";
+      case Fault::stop_failed:
+        return "stop_s";
+      case Fault::following_error:
+        return "following_s";
+      default:
+        return {};
+    }
+  };
+  return {fault, ticks(), time_parameter(), text.name, text.reason};
 }
 }  // namespace detail
 

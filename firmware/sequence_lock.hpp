@@ -1,6 +1,7 @@
 // Sequence lock: the number is odd while an interrupt writes the data that background work copies. If it changed during
 // a copy, the reader copies again. The writer interrupts the reader and never the reverse, so a copy is consistent as
-// soon as no write interrupted it.
+// soon as no write interrupted it. After kTries copies that were interrupted the last one is returned, which may be
+// inconsistent.
 #pragma once
 
 #include <atomic>

@@ -3,7 +3,7 @@
 //
 // The rights of a host are checked here and in Application: parameters and excitation change only while the drive is
 // not armed; what writes is refused while a pairing key locks the parameters; commands go through the application's
-// mailbox, which arms from `idle` alone.
+// mailbox, which arms from `idle` and from one armed mode to another.
 #pragma once
 
 #include <array>

@@ -3,7 +3,8 @@
 //
 // The answer to a command comes with the next frame. The angle is taken while a tick begins and used by the next one:
 // it is one tick old. A frame that does not come, has a wrong parity or an error, or a magnet that is too weak, gives
-// no sample, and the age of the last one is a fault.
+// no sample, and the age of the last one is a fault. With take_one() the angle is one PWM period old, and the magnet is
+// checked in every 256th (12.8 ms).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
-// A serial line, 8N1. The control tick moves one byte each way: up to 115200 baud nothing is lost while
-// background work is busy, and no second interrupt is needed (RM0090, 30).
+// A serial line, 8N1. The control tick moves one byte each way, so that no second interrupt is needed (RM0090, 30).
+// Up to 115200 baud nothing is lost while background work is busy for less than 11 ms, which fill the ring; a host
+// repeats what a check of a signature or an erase took longer for.
 #pragma once
 
 #include <array>

@@ -119,7 +119,7 @@ inline constexpr std::uint32_t kStageFaults = 12;
 
 // Signals of telemetry. Values are of 2^-27 bases unless said otherwise.
 enum class Channel : std::uint8_t {
-  state,           // mode, fault << 8, loops limited << 16
+  state,           // mode, fault << 8, loops limited << 16, motor's turn unknown << 17, output unknown << 18
   readings,        // motor encoder's counter
   motor_turns,     // whole turns of the motor's position
   motor_fraction,  // and the rest, 2^-32 turns

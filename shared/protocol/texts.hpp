@@ -134,7 +134,7 @@ constexpr std::string_view name_of(PairingState state) {
   return static_cast<std::size_t>(state) < kNames.size() ? kNames[static_cast<std::size_t>(state)] : "unknown";
 }
 
-// A fault's name and its cause, by the numbers of firmware/faults.hpp.
+// A fault's name and its cause, by the numbers of states.hpp.
 struct FaultText {
   std::string_view name{};
   std::string_view reason{};

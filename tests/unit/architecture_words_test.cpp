@@ -43,6 +43,10 @@ constexpr Word kWords[] = {
     {"may give up", "cancellation check"},
     {"spoilt", "corrupted"},
     {"knock", "request origin"},
+    {"doubts", "significance checks"},
+    {"verifying", "checked"},
+    {"trusting", "unchecked"},
+    {"giving up", "cancellation token"},
 };
 
 // The text in lower case with the parts of names separated: kHeldTorque, held_torque and held-torque become "held
