@@ -6,6 +6,7 @@
 
 #include "firmware/control.hpp"
 #include "firmware/faults.hpp"
+#include "firmware/stuck_encoder_watch.hpp"
 
 namespace flexspline::firmware {
 
@@ -147,64 +148,8 @@ class Safety {
     const N::Value missing = N::magnitude(e.shown_current - last.current);
     mismatch_ = missing > limits.current_mismatch ? mismatch_ + 1 : 0;
     expect(found, Fault::current_mismatch, mismatch_ < limits.mismatch_ticks, missing.raw, limits.current_mismatch.raw);
-    check_stuck(found, e, last, p);
-  }
-  // The count stays within kRestCounts although a torque must move the shaft: the encoder fails, or the shaft is
-  // blocked. Such a torque is one of three:
-  // - it changed by more than friction can hold, which is twice the breakaway torque; a blocked shaft still twists the
-  //   gear. Torque that alternates faster than the shaft follows does not move it, and the torque that braked it may
-  //   last until it is at rest within its last count: so the torque is smoothed, and is compared from a little after
-  //   the last motion, or from when the drive was armed;
-  // - or it is at its limit, and the velocity loop still demands motion. A load that holds the shaft looks the same;
-  // - or it goes on driving a shaft that turned, and that was not slowing down when its count stopped.
-  void check_stuck(FaultRecord& found, const Estimate& e, const Output& last, const Parameters& p) {
-    const control::SafetyLimits<N>& limits = p.safety;
-    const std::uint32_t settling_ticks = limits.stuck_ticks / kSettlingShare + 1U;
-    const bool begins = !watches_;
-    watches_ = true;
-    smoothed_torque_.raw =
-        begins ? last.torque.raw
-               : smoothed_torque_.raw + ((last.torque.raw - smoothed_torque_.raw) >> kTorqueSmoothingLog2);
-    twice_smoothed_torque_.raw =
-        begins ? last.torque.raw
-               : twice_smoothed_torque_.raw +
-                     ((smoothed_torque_.raw - twice_smoothed_torque_.raw) >> kTorqueSmoothingLog2);
-    displacement_ += static_cast<std::uint32_t>(e.moved);
-    const auto displacement = static_cast<std::int32_t>(displacement_);
-    if (begins || displacement > kRestCounts || displacement < -kRestCounts) {
-      last_direction_ = displacement < 0 ? -1 : 1;
-      driven_direction_ = begins ? 0 : driven_direction(e, limits);
-      displacement_ = 0;
-      unmoved_ = begins ? settling_ticks : 0;
-      stalled_ = 0;
-      lowest_ = highest_ = twice_smoothed_torque_;
-    }
-    // While the shaft comes to rest, torque against the motion brakes it and is not counted; torque that rises in the
-    // direction of the motion is.
-    if (unmoved_ < settling_ticks &&
-        (last_direction_ < 0 ? smoothed_torque_ > lowest_ || smoothed_torque_ > N::Value{}
-                             : smoothed_torque_ < highest_ || smoothed_torque_ < N::Value{}))
-      lowest_ = highest_ = smoothed_torque_;
-    if (smoothed_torque_ < lowest_) lowest_ = smoothed_torque_;
-    if (smoothed_torque_ > highest_) highest_ = smoothed_torque_;
-    const N::Value span = highest_ - lowest_;
-    const std::int32_t onward = driven_direction_ < 0 ? -smoothed_torque_.raw : smoothed_torque_.raw;
-    const bool drives_on = driven_direction_ != 0 && onward > limits.stuck_torque.raw / 2;
-    if (unmoved_ < settling_ticks || span > limits.stuck_torque || drives_on) ++unmoved_;
-    const std::int32_t most = p.loops.torque_limit.raw;
-    const bool at_limit = N::magnitude(smoothed_torque_).raw > most - (most >> 3);
-    const bool stalls = at_limit && N::magnitude(last.error).raw > limits.standstill.raw >> 3;
-    stalled_ = stalls ? stalled_ + 1 : 0;
-    expect(found, Fault::motor_encoder_stuck,
-           unmoved_ < settling_ticks + limits.stuck_ticks && stalled_ < settling_ticks + limits.stuck_ticks,
-           smoothed_torque_.raw, limits.stuck_torque.raw);
-  }
-  // The direction in which the shaft turns if nothing slows it down, otherwise zero.
-  static int driven_direction(const Estimate& e, const control::SafetyLimits<N>& limits) {
-    const std::int32_t rest = limits.standstill.raw;
-    if (e.velocity.raw > rest && e.acceleration.raw >= 0) return 1;
-    if (e.velocity.raw < -rest && e.acceleration.raw <= 0) return -1;
-    return 0;
+    const bool is_stuck = stuck_encoder_.update(e, last, p);
+    expect(found, Fault::motor_encoder_stuck, !is_stuck, stuck_encoder_.smoothed_torque().raw, limits.stuck_torque.raw);
   }
   // The output moves with the motor, except for torsion and backlash. With one line lost the count alternates, so a few
   // counts are not motion. Without limits any count is enough, and nothing is checked.
@@ -212,7 +157,7 @@ class Safety {
     const control::FollowingLimits<N>& limits = p.following;
     turned_ += static_cast<std::uint32_t>(e.moved);
     const auto output = static_cast<std::int32_t>(r.output_counter - output_from_);
-    if (output >= limits.output_counts || output <= -limits.output_counts || !watches_) {
+    if (output >= limits.output_counts || output <= -limits.output_counts || !stuck_encoder_.watches()) {
       output_from_ = r.output_counter;
       turned_ = 0;
     }
@@ -220,7 +165,7 @@ class Safety {
     const std::int32_t most = limits.motor_counts;
     const bool shows_motion = is_within(turned, most);
     expect(found, Fault::output_encoder_stuck, shows_motion, turned, most);
-    const bool is_due = !watches_ || (due & kTemperatureAndGear) != 0;
+    const bool is_due = !stuck_encoder_.watches() || (due & kTemperatureAndGear) != 0;
     // Not for an encoder that failed already: the motor's, with which the drive stops, is intact.
     if (shows_motion && p.has_output_encoder && most > 0 && is_due) check_gear(found, e, p);
   }
@@ -234,7 +179,7 @@ class Safety {
       largest_difference_ = difference + (difference >> 3);
     }
     const std::int64_t difference = (e.output_angle - N::times_order(e.angle, p.feedforward.output_angle)).raw;
-    if (!watches_) reference_difference_ = difference;
+    if (!stuck_encoder_.watches()) reference_difference_ = difference;
     // Angles wrap.
     const auto off = static_cast<std::int64_t>(static_cast<std::uint64_t>(difference) -
                                                static_cast<std::uint64_t>(reference_difference_));
@@ -295,7 +240,7 @@ class Safety {
     return (size >> 48) != 0 ? 0xFFFFFFFF : static_cast<std::uint32_t>(size >> 16);
   }
   void forget_motion() {
-    watches_ = false;
+    stuck_encoder_.stop();
     mismatch_ = 0;
     host_age_ = 0;
   }
@@ -311,27 +256,18 @@ class Safety {
   std::uint32_t above_board_ = 0;
   std::uint32_t hot_ = 0;
   std::uint32_t mismatch_ = 0;
-  std::uint32_t unmoved_ = 0;
-  std::uint32_t stalled_ = 0;
-  std::uint32_t displacement_ = 0;  // of the motor from its position of rest, counts; wraps
   std::uint32_t lagging_ = 0;
   std::uint32_t output_from_ = 0;
-  std::uint32_t turned_ = 0;          // of the motor since then, counts; wraps
-  N::Value smoothed_torque_{};        // torque, smoothed
-  N::Value twice_smoothed_torque_{};  // smoothed again: a motion is later than the torque that causes it
-  N::Value lowest_{};
-  N::Value highest_{};
+  std::uint32_t turned_ = 0;  // of the motor since then, counts; wraps
+  StuckEncoderWatch stuck_encoder_{};
   std::uint8_t current_outside_ = 0;
   std::uint8_t torque_outside_ = 0;
   std::uint8_t temperature_outside_ = 0;
-  int last_direction_ = 0;                 // of the last motion
-  int driven_direction_ = 0;               // direction in which the shaft was driven when its count stopped
   std::int64_t reference_difference_ = 0;  // between both encoders when the drive was armed, 2^-32 turns of the output
   std::int64_t largest_difference_ = 0;    // zero: not known yet
   std::int64_t near_ = 0;                  // a lag of the position that is allowed at any speed
   bool waits_ = false;                     // for a sample that is older than a tick
   bool outside_ = false;                   // a reading was not valid
-  bool watches_ = false;
   bool follows_ = false;
   Mode mode_{};
 };

@@ -368,15 +368,15 @@ class Service {
     for (const std::int32_t word : {c.velocity, c.acceleration, c.current})
       if (word == INT32_MIN) return finish(Code::wrong_value);
     if (c.position <= -kFarthest || c.position >= kFarthest) return finish(Code::wrong_value);
-    command_ = {c.kind,
-                c.mode,
-                c.compensate,
-                c.stream,
-                ++command_number_,
-                N::Angle{c.position},
-                N::Value{{c.velocity}},
-                N::Value{{c.acceleration}},
-                N::Value{{c.current}}};
+    command_ = {.kind = c.kind,
+                .mode = c.mode,
+                .compensate = c.compensate,
+                .stream = c.stream,
+                .number = ++command_number_,
+                .position = N::Angle{c.position},
+                .velocity = N::Value{{c.velocity}},
+                .acceleration = N::Value{{c.acceleration}},
+                .current = N::Value{{c.current}}};
     submit();
   }
   void submit() {

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "boards/stm32f4/registers.hpp"
+#include "boards/stm32f4/unwrapped_angle.hpp"
 
 namespace flexspline::stm32f4 {
 
@@ -18,7 +19,7 @@ class As5600 {
   static constexpr std::uint32_t kSampleTicks = 20;
 
   void start(bool reversed) {
-    reversed_ = reversed;
+    angle_.reverse(reversed);
     switch_clock_on(i2c);
     set_up_bus();
   }
@@ -27,7 +28,7 @@ class As5600 {
     step();
     if (!fresh_) return false;
     fresh_ = false;
-    count = total_;
+    count = angle_.total();
     return true;
   }
   // At its end.
@@ -118,20 +119,14 @@ class As5600 {
   static void clear_addressed() { [[maybe_unused]] const std::uint32_t read = hardware(i2c + kStatus2); }
   void finish() {
     if ((bytes_[0] & kMagnetIsThere) == 0) return;
-    const std::uint32_t angle = ((bytes_[1] << 8) | bytes_[2]) % kCounts;
-    const std::uint32_t now = reversed_ ? (kCounts - angle) % kCounts : angle;
-    const std::uint32_t moved = (now - total_) % kCounts;
-    total_ += started_ && moved >= kCounts / 2 ? moved - kCounts : moved;
-    started_ = true;
+    angle_.add(((bytes_[1] << 8) | bytes_[2]) % kCounts);
     fresh_ = true;
   }
 
-  std::uint32_t total_ = 0;  // begins within a turn
+  UnwrappedAngle<kCounts> angle_{};
   std::uint32_t bytes_[3]{};
   std::uint32_t idle_ = 0;
   Phase phase_ = Phase::start;
-  bool reversed_ = false;
-  bool started_ = false;
   bool fresh_ = false;
 };
 

@@ -11,6 +11,7 @@
 
 #include "boards/stm32f4/pins.hpp"
 #include "boards/stm32f4/registers.hpp"
+#include "boards/stm32f4/unwrapped_angle.hpp"
 
 namespace flexspline::stm32f4 {
 
@@ -20,7 +21,7 @@ class As5047 {
   static constexpr std::uint32_t kCounts = 1U << 14;
 
   void start(bool reversed) {
-    reversed_ = reversed;
+    angle_.reverse(reversed);
     switch_clock_on(spi);
     write(select, true);
     set_up_bus();
@@ -33,7 +34,7 @@ class As5047 {
     finish();  // the diagnosis
     begin(Command::diagnosis);
     if (!fresh || !magnet_) return false;
-    count = total_;
+    count = angle_.total();
     return true;
   }
   // Instead of both for who calls once a PWM period: one frame a call, each 256th for the diagnosis. The angle is one
@@ -43,7 +44,7 @@ class As5047 {
     finish();
     begin(frames_++ % 256 == 0 ? Command::diagnosis : Command::angle);
     if (!fresh_ || !magnet_) return false;
-    count = total_;
+    count = angle_.total();
     return true;
   }
   // At its end.
@@ -91,25 +92,17 @@ class As5047 {
     if (is_flagged || __builtin_parity(answer) != 0) return;
     if (answered_ == Command::diagnosis) magnet_ = (answer & kMagnetBits) == kMagnetGood;
     if (answered_ == Command::angle) {
-      add(answer & (kCounts - 1));
+      angle_.add(answer & (kCounts - 1));
       fresh_ = true;
     }
   }
-  void add(std::uint32_t angle) {
-    const std::uint32_t now = reversed_ ? (kCounts - angle) % kCounts : angle;
-    const std::uint32_t moved = (now - total_) % kCounts;
-    total_ += started_ && moved >= kCounts / 2 ? moved - kCounts : moved;
-    started_ = true;
-  }
 
-  std::uint32_t total_ = 0;  // begins within a turn
+  UnwrappedAngle<kCounts> angle_{};
   // The answer to a command comes with the next frame. All members are zero at first, or the whole drive would take
   // flash memory for its initial value.
   std::uint8_t frames_ = 0;
   Command sent_ = Command::none, answered_ = Command::none;
   bool has_error_ = false;
-  bool reversed_ = false;
-  bool started_ = false;
   bool fresh_ = false;
   bool magnet_ = false;
 };

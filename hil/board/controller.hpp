@@ -8,6 +8,7 @@
 
 #include "firmware/application.hpp"
 #include "firmware/co_simulation.hpp"
+#include "shared/control/excitation_setup.hpp"
 
 namespace flexspline::board {
 
@@ -69,15 +70,12 @@ class SoftwareBoard {
     return stage != nullptr ? stage->fault() : firmware::StageFault::none;
   }
 
-  /// The same in each run: the generator of Steele, Lea and Flood (SplitMix64), from `random` on.
+  /// The same in each run, from `random` on.
   firmware::RandomWords random_words() {
+    control::SplitMix generator(random);
     firmware::RandomWords words{};
-    for (std::uint32_t& word : words) {
-      std::uint64_t x = random += 0x9E3779B97F4A7C15;
-      x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
-      x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
-      word = static_cast<std::uint32_t>(x ^ (x >> 31));
-    }
+    for (std::uint32_t& word : words) word = static_cast<std::uint32_t>(generator.next());
+    random = generator.state();
     return words;
   }
 

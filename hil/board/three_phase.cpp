@@ -121,14 +121,8 @@ double encoder_angle(const ThreePhaseParameters& p, double angle_rad) {
 // The encoder's counter, as the stage reads it.
 std::uint32_t ThreePhaseAmplifier::counter_at(double angle_rad) {
   const double turns = encoder_angle(p_, angle_rad) / kTurn;
-  if (!began_) slip_from_turns_ = turns;
-  began_ = true;
-  if (p_.encoder_stands) return static_cast<std::uint32_t>(std::llround(slip_from_turns_ * counts_));
-  if (p_.slip_every_turns > 0.0 && std::abs(turns - slip_from_turns_) >= p_.slip_every_turns) {
-    slipped_turns_ += turns > slip_from_turns_ ? p_.slip_turns : -p_.slip_turns;
-    slip_from_turns_ = turns;
-  }
-  return static_cast<std::uint32_t>(std::llround((turns - slipped_turns_) * counts_));
+  const double seen = slip_.encoder_turns(turns, p_.slip_every_turns, p_.slip_turns);
+  return static_cast<std::uint32_t>(std::llround((p_.encoder_stands ? slip_.first_turns() : seen) * counts_));
 }
 
 std::uint32_t ThreePhaseAmplifier::faulty(std::uint32_t counter) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "firmware/three_phase.hpp"
+#include "hil/motor/encoder_slip.hpp"
 #include "hil/motor/power_stage.hpp"
 #include "hil/motor/shunts.hpp"
 #include "hil/plant/parameters.hpp"
@@ -122,9 +123,7 @@ class ThreePhaseAmplifier {
   motor::Shunts shunts_;
   firmware::ThreePhaseStage stage_;
   firmware::ThreePhaseStage::Outputs out_;
-  double slipped_turns_ = 0.0;
-  double slip_from_turns_ = 0.0;
-  bool began_ = false;
+  motor::EncoderSlip slip_;
   StageFaults faults_;
   StageEncoder encoder_ = StageEncoder::intact;
   std::uint32_t counter_ = 0;  // intact, of the last period

@@ -22,13 +22,7 @@ double Shaft::turns() const {
 
 std::uint32_t ShaftEncoder::read(double shaft_turns) {
   if (p_.stands) return 0;
-  if (!began_) since_turns_ = shaft_turns;
-  began_ = true;
-  if (p_.slip_every_turns > 0.0 && std::abs(shaft_turns - since_turns_) > p_.slip_every_turns) {
-    slipped_turns_ += std::copysign(p_.slip_turns, shaft_turns - since_turns_);
-    since_turns_ = shaft_turns;
-  }
-  const double seen = shaft_turns - slipped_turns_;
+  const double seen = slip_.encoder_turns(shaft_turns, p_.slip_every_turns, p_.slip_turns);
   const double turns = (p_.reversed ? -seen : seen) + p_.offset_turns;
   const double counts = std::floor((turns - std::floor(turns)) * p_.counts_per_turn);
   return static_cast<std::uint32_t>(static_cast<std::int64_t>(counts * std::ldexp(1.0, 32) / p_.counts_per_turn));

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "hil/motor/encoder_slip.hpp"
 #include "hil/motor/motor.hpp"
 #include "hil/motor/parameters.hpp"
 
@@ -34,9 +35,7 @@ class ShaftEncoder {
 
  private:
   EncoderParameters p_;
-  double slipped_turns_ = 0.0;
-  double since_turns_ = 0.0;
-  bool began_ = false;
+  EncoderSlip slip_;
 };
 
 }  // namespace flexspline::motor

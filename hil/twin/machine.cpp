@@ -14,26 +14,7 @@ namespace {
 using Dfu = Machine::Loader::Dfu;
 
 // The boot loader's device on the bus; its memory is written between two packets.
-struct Connector final : usbip::BusDevice {
-  explicit Connector(const std::string& serial) : device(serial) {}
-  void reset() override {
-    device.reset();
-    was_reset = true;
-  }
-  void setup(std::span<const std::uint8_t, 8> bytes) override { device.setup(bytes); }
-  usbip::Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
-    const usbip::Handshake hand = device.in(endpoint, packet);
-    device.poll();
-    return hand;
-  }
-  usbip::Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
-    const usbip::Handshake hand = device.out(endpoint, packet);
-    device.poll();
-    return hand;
-  }
-  usbip::CoreDevice<usb::LoaderIdentity, Dfu> device;
-  bool was_reset = false;
-};
+using Connector = usbip::ResetNotingDevice<usbip::CoreDevice<usb::LoaderIdentity, Dfu>, true>;
 
 bool is_blank(const ImageFlash& flash) {
   for (std::size_t s = 0; s < boot::kImageSectors; ++s)

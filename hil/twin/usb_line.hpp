@@ -43,23 +43,8 @@ class UsbLine final : public HostLine {
   // Room for the telemetry between two frames of the bus, and for more requests than a host has open.
   using Reports = usb::Hid<16, 4>;
 
-  // The device on the bus. If one host leaves and another one connects between two calls, their resets show it.
-  struct Connector final : usbip::BusDevice {
-    explicit Connector(const std::string& serial) : device(serial) {}
-    void reset() override {
-      device.reset();
-      was_reset = true;
-    }
-    void setup(std::span<const std::uint8_t, 8> bytes) override { device.setup(bytes); }
-    usbip::Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
-      return device.in(endpoint, packet);
-    }
-    usbip::Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
-      return device.out(endpoint, packet);
-    }
-    usbip::CoreDevice<usb::FlexsplineIdentity, Reports, usb::DfuRuntime> device;
-    bool was_reset = false;
-  };
+  // If one host leaves and another one connects between two calls, their resets show it.
+  using Connector = usbip::ResetNotingDevice<usbip::CoreDevice<usb::FlexsplineIdentity, Reports, usb::DfuRuntime>>;
 
   std::string serial_;
   Reports& reports() const { return connector_->device.get<Reports>(); }

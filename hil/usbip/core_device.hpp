@@ -54,4 +54,30 @@ class CoreDevice final : public BusDevice {
   usb::Device<Identity, SoftwarePort, Classes...> core_{port_, serial_};
 };
 
+/// Such a device on the bus, which notes that the host reset it. `polls`: what it received is served between two
+/// packets.
+template <class Device, bool polls = false>
+struct ResetNotingDevice final : BusDevice {
+  explicit ResetNotingDevice(const std::string& serial) : device(serial) {}
+  void reset() override {
+    device.reset();
+    was_reset = true;
+  }
+  void setup(std::span<const std::uint8_t, 8> bytes) override { device.setup(bytes); }
+  Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& packet) override {
+    return served(device.in(endpoint, packet));
+  }
+  Handshake out(std::uint8_t endpoint, std::span<const std::uint8_t> packet) override {
+    return served(device.out(endpoint, packet));
+  }
+  Device device;
+  bool was_reset = false;
+
+ private:
+  Handshake served(Handshake hand) {
+    if constexpr (polls) device.poll();
+    return hand;
+  }
+};
+
 }  // namespace flexspline::usbip

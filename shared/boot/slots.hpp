@@ -12,6 +12,7 @@
 
 #include "shared/boot/image.hpp"
 #include "shared/storage/flash_port.hpp"
+#include "shared/storage/words.hpp"
 
 namespace flexspline::boot {
 
@@ -126,14 +127,10 @@ class Slots {
   constexpr SlotError write(std::span<const std::uint8_t> chunk) {
     if (!staging_ || staged_ % 4 != 0) return SlotError::out_of_order;
     if (chunk.size() > kImageBytes - staged_) return SlotError::too_long;
-    for (std::size_t i = 0; i < chunk.size(); i += 4) {
-      std::uint32_t value = storage::kErasedWord;
-      for (std::size_t b = 0; b < 4 && i + b < chunk.size(); ++b) {
-        value &= ~(std::uint32_t{0xFF} << (8 * b));
-        value |= std::uint32_t{chunk[i + b]} << (8 * b);
-      }
-      if (!put(Slot::download, (staged_ + i) / 4, value)) return fail(SlotError::program);
-    }
+    const std::size_t first = staged_ / 4;
+    if (!storage::for_each_word(
+            chunk, [&](std::size_t i, std::uint32_t value) { return put(Slot::download, first + i, value); }))
+      return fail(SlotError::program);
     const bool had_header = staged_ >= kHeaderBytes;
     staged_ += chunk.size();
     if (had_header || staged_ < kHeaderBytes) return SlotError::none;
@@ -262,9 +259,7 @@ class Slots {
   }
   constexpr SlotError erase(Slot slot) {
     if (!flash_.erase(number(slot))) return SlotError::erase;
-    for (const std::uint8_t byte : all_of(slot))
-      if (byte != 0xFF) return SlotError::not_blank;
-    return SlotError::none;
+    return storage::is_blank(all_of(slot)) ? SlotError::none : SlotError::not_blank;
   }
   // What waits for the rest of a double word.
   constexpr bool flush() {

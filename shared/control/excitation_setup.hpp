@@ -90,6 +90,7 @@ class SplitMix {
     z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
     return z ^ (z >> 31);
   }
+  constexpr std::uint64_t state() const { return state_; }  // the seed of what follows
 
  private:
   std::uint64_t state_;

@@ -12,6 +12,7 @@
 #include "shared/model/encoding.hpp"
 #include "shared/protocol/states.hpp"
 #include "shared/storage/flash_port.hpp"
+#include "shared/storage/words.hpp"
 
 namespace flexspline::storage {
 
@@ -98,14 +99,9 @@ class ParameterStore {
     if (chunk.size() % 4 != 0 && offset + chunk.size() != announced_) return StoreError::out_of_order;
     const std::size_t s = target();
     if (offset < staged_) return is_same(s, offset, chunk) ? StoreError::none : StoreError::out_of_order;
-    for (std::size_t i = 0; i < chunk.size(); i += 4) {
-      std::uint32_t value = kErasedWord;
-      for (std::size_t b = 0; b < 4 && i + b < chunk.size(); ++b) {
-        value &= ~(std::uint32_t{0xFF} << (8 * b));
-        value |= std::uint32_t{chunk[i + b]} << (8 * b);
-      }
-      if (!put(s, (kHeaderBytes + offset + i) / 4, value)) return flash_failed();
-    }
+    const std::size_t first = (kHeaderBytes + offset) / 4;
+    if (!for_each_word(chunk, [&](std::size_t i, std::uint32_t value) { return put(s, first + i, value); }))
+      return flash_failed();
     staged_ = offset + chunk.size();
     return StoreError::none;
   }
@@ -237,10 +233,7 @@ class ParameterStore {
   }
   constexpr bool erase(std::size_t sector) {
     rank_[sector] = 0;
-    if (!flash_.erase(sector)) return false;
-    for (const std::uint8_t byte : flash_.bytes(sector))
-      if (byte != 0xFF) return false;
-    return true;
+    return flash_.erase(sector) && is_blank(flash_.bytes(sector));
   }
   // Before the other block is invalidated: writes the active block's number again, completely, as the next one in a new
   // slot. A power cut leaves bits that do not always read the same. If the active block's number has such bits, it
