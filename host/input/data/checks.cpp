@@ -161,7 +161,12 @@ void check_constant_columns(const Experiment& experiment, Findings& findings) {
     findings.add(may_be ? Severity::note : Severity::warning, "constant_column", experiment.file.string(), 0,
                  std::string(column_name(column)),
                  fmt::format("in \"{}\" it is {:.6g} throughout", experiment.name, experiment[column].front()),
-                 may_be ? "nothing needs doing if that is so" : "check that the sensor is connected and logged");
+                 may_be ? "nothing needs doing if that is so"
+                 : of_output
+                     ? fmt::format("where the output is locked, {}; else check that the sensor is connected and "
+                                   "logged",
+                                   kStateLocked)
+                     : "check that the sensor is connected and logged");
   }
 }
 

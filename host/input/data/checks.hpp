@@ -2,11 +2,15 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 
 #include "host/input/data/dataset.hpp"
 #include "host/input/data/findings.hpp"
 
 namespace flexspline::data {
+
+// What to do where an output that does not move is held on purpose.
+inline constexpr std::string_view kStateLocked = "write load = \"locked\" under its [[experiment]] in dataset.toml";
 
 // On the samples as they are in the file, before any resampling; `segments` and `masked` must be set.
 

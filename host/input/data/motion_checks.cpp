@@ -42,6 +42,11 @@ std::string cause_of(double factor, const DriveFacts& drive) {
   return "";
 }
 
+// Beyond a factor of two no filter or delay explains it.
+bool is_of_units(double factor) {
+  return std::abs(factor) > 2.0 || std::abs(factor) < 0.5;
+}
+
 // Trapezoidal integral, from zero at the start of each segment.
 std::vector<double> integral(const std::vector<double>& signal, const Experiment& experiment) {
   std::vector<double> sum(signal.size(), 0.0);
@@ -57,15 +62,18 @@ void check_velocity(const Experiment& experiment, Column position, Column veloci
   const IncrementRatio ratio =
       increment_ratio(integral(experiment[velocity], experiment), experiment[position], experiment.segments);
   if (!ratio.meaningful || (ratio.factor >= 0.95 && ratio.factor <= 1.05)) return;
-  const std::string cause = cause_of(ratio.factor, drive);
-  findings.add(Severity::error, "velocity_position_mismatch", experiment.file.string(), 0,
-               std::string(column_name(velocity)),
-               fmt::format("in \"{}\" it is {:.4g} times the derivative of {}{}{}", experiment.name, ratio.factor,
-                           column_name(position), cause.empty() ? "" : ": ", cause),
-               fmt::format("give unit or scale of the wrong one under [columns.{}] or [columns.{}] in dataset.toml, or "
-                           "leave one out{}",
-                           column_name(velocity), column_name(position),
-                           cause.empty() ? "; --tolerate velocity_position_mismatch uses it" : ""));
+  std::string cause = cause_of(ratio.factor, drive);
+  const bool of_units = cause.empty() && is_of_units(ratio.factor);
+  if (of_units) cause = "the unit of one of them, or its counts per turn, is likely another one";
+  findings.add(
+      Severity::error, "velocity_position_mismatch", experiment.file.string(), 0, std::string(column_name(velocity)),
+      fmt::format("in \"{}\" it is {:.4g} times the derivative of {}{}{}", experiment.name, ratio.factor,
+                  column_name(position), cause.empty() ? "" : ": ", cause),
+      fmt::format("give unit or scale of the wrong one under [columns.{}] or [columns.{}] in dataset.toml{}, or "
+                  "leave one out{}",
+                  column_name(velocity), column_name(position),
+                  of_units ? " (unit = \"0.00153 rad\" where a turn is 4096 counts)" : "",
+                  cause.empty() ? "; --tolerate velocity_position_mismatch uses it" : ""));
 }
 
 // One column that shows whether the drive moves.
@@ -160,10 +168,12 @@ void check_gear_ratio(const Experiment& experiment, const DriveFacts& drive, Fin
   if (near(std::abs(factor), 360.0 / kTurn_rad)) cause = ": the output is in degrees";
   if (near(std::abs(factor), kTurn_rad / 360.0)) cause = ": the motor is in degrees";
   if (near(std::abs(factor), *drive.gear_ratio)) cause = ": both are on the same side of the gear";
+  const std::string locked =
+      std::abs(factor) < 0.8 && cause.empty() ? fmt::format("where the output is locked, {}; else ", kStateLocked) : "";
   findings.add(Severity::warning, "gear_ratio", experiment.file.string(), 0, "output_position_rad",
                fmt::format("in \"{}\" it moves {:.4g} times as far as motor_position_rad / gear_ratio ({}){}",
                            experiment.name, factor, *drive.gear_ratio, cause),
-               "check gear_ratio, and unit and scale of both columns in dataset.toml");
+               locked + "check gear_ratio, and unit and scale of both columns in dataset.toml");
 }
 
 void check_wrapped_positions(Experiment& experiment, Axis axis, Findings& findings) {

@@ -4,16 +4,34 @@
 
 #include <algorithm>
 #include <charconv>
+#include <fstream>
 #include <iterator>
 
 #include "host/input/data/array_file.hpp"
 #include "host/input/data/csv.hpp"
+#include "host/input/data/csv_fields.hpp"
 #include "host/input/data/file_format.hpp"
 
 namespace flexspline::data {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Whether a text is a table, as notes are none: so many lines of two numbers at least, as the fewest samples need.
+bool is_table(const fs::path& path) {
+  constexpr int kFewestLines = 32;
+  constexpr std::size_t kMostBytes = 1 << 18;
+  std::ifstream file(path, std::ios::binary);
+  std::size_t bytes = 0;
+  int lines = 0;
+  for (std::string line; lines < kFewestLines && bytes < kMostBytes && std::getline(file, line);) {
+    bytes += line.size() + 1;
+    const char separator = separator_of(line);
+    const std::vector<std::string_view> fields = split(line, separator);
+    lines += fields.size() >= 2 && is_number(fields[0], separator) && is_number(fields[1], separator);
+  }
+  return lines == kFewestLines;
+}
 
 }  // namespace
 
@@ -22,6 +40,7 @@ bool is_recording(const fs::path& path) {
                                                   ".npz", ".npy", ".bag", ".db3", ".mcap"};
   std::string extension = lower_extension(path);
   if (extension == ".gz") extension = lower_extension(path.stem());
+  if (extension == ".txt") return is_table(path);
   return std::find(std::begin(kEndings), std::end(kEndings), extension) != std::end(kEndings);
 }
 
@@ -71,8 +90,9 @@ std::vector<fs::path> recordings_in(const fs::path& folder, Findings& findings) 
     if (entry.is_regular_file() && is_recording(entry.path())) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   if (files.empty())
-    findings.fail("file", folder.string(), 0, "the folder has no CSV or MAT file and no dataset.toml",
-                  "give a folder with .csv, .tsv, .mat, .h5, .npz, .npy, .bag, .db3 or .mcap files");
+    findings.fail(
+        "file", folder.string(), 0, "the folder has no CSV or MAT file and no dataset.toml",
+        "give a folder with .csv, .tsv, .mat, .h5, .npz, .npy, .bag, .db3 or .mcap files, or tables in .txt files");
   return files;
 }
 

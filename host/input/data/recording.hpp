@@ -90,7 +90,7 @@ ElementName without_element(std::string_view name);
 // `findings` holds) of kind "file", "format" or "header".
 std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, Findings& findings);
 
-// Whether a file is read as a recording where a folder is given: by its ending.
+// Whether a file is read as a recording where a folder is given: by its ending; a .txt where it begins with a table.
 bool is_recording(const std::filesystem::path& path);
 
 // The recordings right in a folder, by name. Throws DataError of kind "file" if there
