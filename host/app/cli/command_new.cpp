@@ -84,10 +84,12 @@ int run(const NewOptions& options, Console& console) {
   console.line(fmt::format("{} and {} are written. Next:", dataset_file.string(), model_file.string()));
   const std::string out = quoted(options.request.out.string());
   const std::string fitted = quoted((options.request.out / "fitted.toml").string());
-  console.line(fmt::format("  flexspline check {}", out));
-  console.line(fmt::format("  flexspline identify {} --model {} --out {}", out, quoted(model_file.string()), fitted));
-  console.line(fmt::format("  flexspline compare --model {} {}", fitted, out));
-  console.line(fmt::format("  flexspline diagnose --model {} {}", fitted, out));
+  const std::string tolerate = tolerate_arguments(options.request.tolerate);
+  console.line(fmt::format("  flexspline check {}{}", out, tolerate));
+  console.line(fmt::format("  flexspline identify {} --model {} --out {}{}", out, quoted(model_file.string()), fitted,
+                           tolerate));
+  console.line(fmt::format("  flexspline compare --model {} {}{}", fitted, out, tolerate));
+  console.line(fmt::format("  flexspline diagnose --model {} {}{}", fitted, out, tolerate));
   output::save_json(options.json, json_of(options, draft, base));
   return kDone;
 }
@@ -95,7 +97,9 @@ int run(const NewOptions& options, Console& console) {
 void declare(Parser& parser, NewOptions& options) {
   parser.option("--from", options.request.data, kDataHelp).required().value("DATA");
   parser.option("--out", options.request.out, "folder for dataset.toml and base-model.toml").required().value("DIR");
-  parser.option("--map", options.request.map, "a column of ours is theirs, in this unit; may be repeated")
+  parser
+      .option("--map", options.request.map,
+              "a column of ours is theirs, in this unit, or times this number; may be repeated")
       .value("OURS=THEIRS[:UNIT]")
       .one_value_each_time();
   parser
@@ -127,6 +131,9 @@ void declare(Parser& parser, NewOptions& options) {
       .option("--encoder-counts", options.request.encoder_counts, "counts per motor turn (per metre on a linear axis)")
       .positive()
       .value("COUNTS");
+  parser.option("--pitch-m", options.request.pitch_m, "of a linear axis: travel of one motor turn, m")
+      .positive()
+      .value("METRES");
   parser
       .option("--pole-pairs", options.request.pole_pairs,
               "of the motor, where the log has its speed in electrical turns")

@@ -108,6 +108,16 @@ std::string as_arguments(const std::vector<fs::path>& paths) {
   return text;
 }
 
+std::string tolerate_arguments(const std::vector<std::string>& kinds) {
+  std::string text;
+  for (const std::string& kind : kinds) text += " --tolerate " + quoted(kind);
+  return text;
+}
+
+std::string as_arguments(const DataInputs& inputs) {
+  return as_arguments(inputs.data) + tolerate_arguments(inputs.tolerate);
+}
+
 void require_effect(const std::string& name) {
   if (catalogue::find(name) != nullptr || catalogue::description_of(name) != nullptr) return;
   std::vector<std::string_view> names = {catalogue::kTableEffect, catalogue::kExpressionEffect};

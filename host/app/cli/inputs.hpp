@@ -58,6 +58,10 @@ model::Model load_identified_model(const std::filesystem::path& path);
 // Paths as they would be typed after a command.
 std::string as_arguments(const std::vector<std::filesystem::path>& paths);
 std::string quoted(const std::string& argument);
+// " --tolerate KIND" for each.
+std::string tolerate_arguments(const std::vector<std::string>& kinds);
+// Measurements with what is tolerated in them, for a command that reads them again.
+std::string as_arguments(const DataInputs& inputs);
 
 // Throws UsageError with the nearest name where the catalogue has no such effect, nor is it one that users define.
 void require_effect(const std::string& name);

@@ -8,8 +8,8 @@
 #include <set>
 #include <vector>
 
+#include "host/app/project/candidates.hpp"
 #include "host/app/project/column_names.hpp"
-#include "host/common/text/nearest.hpp"
 #include "host/input/data/findings.hpp"
 #include "host/physics/model/text.hpp"
 #include "shared/model/encoding.hpp"
@@ -18,6 +18,8 @@ namespace flexspline::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using project::Candidate;
+using project::Kind;
 
 // Behind the first line's text, so that all lines stay where they are.
 std::string mark_of(std::string_view other_lines) {
@@ -26,12 +28,19 @@ std::string mark_of(std::string_view other_lines) {
                      model::crc32({bytes, other_lines.size()}));
 }
 
-std::vector<data::Finding> errors_of(const std::exception& why) {
-  std::vector<data::Finding> errors;
+std::vector<data::Finding> findings_of(const std::exception& why, data::Severity severity) {
+  std::vector<data::Finding> findings;
   if (const auto* unusable = dynamic_cast<const data::DataError*>(&why))
     for (const data::Finding& finding : unusable->findings())
-      if (finding.severity == data::Severity::error) errors.push_back(finding);
-  return errors;
+      if (finding.severity == severity) findings.push_back(finding);
+  return findings;
+}
+
+// Units that are likely wrong are likely why two columns do not fit together.
+std::vector<data::Finding> warnings_of_units(const std::exception& why) {
+  std::vector<data::Finding> warnings = findings_of(why, data::Severity::warning);
+  std::erase_if(warnings, [](const data::Finding& warning) { return warning.kind != "unit"; });
+  return warnings;
 }
 
 std::string as_argument(const std::string& name, const std::string& value) {
@@ -55,41 +64,72 @@ std::string as_given(const project::Request& request) {
   line += number_argument("--gear-ratio", request.gear_ratio);
   line += number_argument("--torque-constant", request.torque_constant_nm_a);
   line += number_argument("--encoder-counts", request.encoder_counts);
-  for (const std::string& kind : request.tolerate) line += as_argument("--tolerate", kind);
-  return line;
+  line += number_argument("--pitch-m", request.pitch_m);
+  return line + tolerate_arguments(request.tolerate);
 }
 
-// A --map for each signal that a motor balance needs and that was not found.
-std::string missing_maps(const project::Draft& draft) {
+struct Missing {
+  std::string ours;
+  Kind kind = Kind::none;
+};
+
+// What a motor balance needs and was not found. `candidates`: where they have a torque and no current, that is meant.
+std::vector<Missing> missing_of(const project::Draft& draft, const std::vector<Candidate>& candidates) {
   const auto there = [&](std::initializer_list<const char*> any) {
     return std::any_of(any.begin(), any.end(), [&](const char* name) {
       return std::find(draft.there.begin(), draft.there.end(), name) != draft.there.end();
     });
   };
-  std::vector<std::string> missing;
-  std::string line;
-  if (!there({"time_s"})) missing.emplace_back("time_s");
-  // "torque_nm" is the torque sensor's by its name, but many drives call their motor's torque so.
+  const auto is_candidate = [&](Kind kind) {
+    return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) { return c.kind == kind; });
+  };
+  std::vector<Missing> missing;
+  if (!there({"time_s"})) missing.push_back({"time_s", Kind::time});
   if (!there({"current_a", "motor_torque_nm"})) {
-    if (there({"torque_nm"}) && !draft.toml.columns.contains("torque_nm"))
-      line += " --map motor_torque_nm=torque_nm";
+    if (is_candidate(Kind::torque) && !is_candidate(Kind::current))
+      missing.push_back({"motor_torque_nm", Kind::torque});
     else
-      missing.emplace_back("current_a");
+      missing.push_back({"current_a", Kind::current});
   }
-  if (!there({"motor_position_rad", "motor_velocity_rad_s"})) missing.emplace_back("motor_position_rad");
-  std::vector<std::string> left = draft.unused;
-  for (const std::string& ours : missing) {
+  if (!there({"motor_position_rad", "motor_velocity_rad_s"})) missing.push_back({"motor_position_rad", Kind::position});
+  return missing;
+}
+
+// A --map for each signal that a motor balance needs and that was not found.
+std::string missing_maps(const project::Draft& draft, const project::Request& request) {
+  std::vector<Candidate> left = candidates_of(draft, request);
+  std::string line;
+  for (const Missing& missing : missing_of(draft, left)) {
+    // "torque_nm" is the torque sensor's by its name, but many drives call their motor's torque so.
+    if (missing.kind == Kind::current && !draft.toml.columns.contains("torque_nm") &&
+        std::find(draft.there.begin(), draft.there.end(), "torque_nm") != draft.there.end()) {
+      line += " --map motor_torque_nm=torque_nm";
+      continue;
+    }
     std::string theirs = "NAME";
-    if (!left.empty()) {
-      theirs = text::nearest_first(ours, left).front();
-      std::erase(left, theirs);
-      if (ours == "time_s" && project::counts_samples(theirs))
+    if (const Candidate* nearest = nearest_candidate(left, missing.ours, missing.kind)) {
+      theirs = nearest->name;
+      std::erase_if(left, [&](const Candidate& c) { return c.name == theirs; });
+      if (missing.kind == Kind::time && project::counts_samples(theirs))
         theirs += ":PERIOD ms";
       else if (!project::unknown_unit_in_name(theirs).empty())
         theirs += ":UNIT";
     }
-    line += fmt::format(" --map {}", quoted(fmt::format("{}={}", ours, theirs)));
+    line += fmt::format(" --map {}", quoted(fmt::format("{}={}", missing.ours, theirs)));
   }
+  return line;
+}
+
+// A --map with a unit for position and velocity whose units do not fit together and are not stated.
+std::string missing_units(const project::Draft& draft, const std::vector<data::Finding>& errors) {
+  const bool is_unit = std::any_of(errors.begin(), errors.end(), [](const data::Finding& error) {
+    return error.kind == "velocity_position_mismatch" && error.remedy.find("--tolerate") == std::string::npos;
+  });
+  std::string line;
+  for (const project::ColumnGuess& c : draft.columns)
+    if (is_unit && c.unit.empty() && !c.why.empty() &&
+        (c.ours.find("position_rad") != std::string::npos || c.ours.find("velocity_rad_s") != std::string::npos))
+      line += fmt::format(" --map {}", quoted(fmt::format("{}={}:UNIT", c.ours, c.theirs)));
   return line;
 }
 
@@ -133,10 +173,12 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   const std::size_t end_of_first = text.find('\n');
   text.insert(end_of_first, mark_of(std::string_view(text).substr(end_of_first + 1)));
   model::save(file, text);
-  const std::vector<data::Finding> errors = errors_of(why);
+  const std::vector<data::Finding> errors = findings_of(why, data::Severity::error);
   for (const data::Finding& error : errors) console.error(error.text());
+  for (const std::string& warning : data::warning_texts(warnings_of_units(why))) console.warn(warning);
   if (errors.empty()) console.error(why.what());
-  std::string line = as_given(request) + missing_maps(draft) + missing_counts(errors) + tolerations(errors);
+  std::string line = as_given(request) + missing_maps(draft, request) + missing_units(draft, errors) +
+                     missing_counts(errors) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side SIDE";
   console.error(
       fmt::format("{} holds what could be found; replace NAME, UNIT, PERIOD, NUMBER, SIDE or a wrong name by the right "

@@ -95,10 +95,15 @@ class Guesser {
     bool current = is_mapped("current_a") || is_native("current_a");
     for (const std::string& name : names_)
       current = current || (is_free(name) && readings_[name].kind == Kind::current);
-    // Names that say more come first; a unit alone is the weakest sign.
+    // Names that say more come first: the current of the q axis, then what is measured or of the motor. A unit alone is
+    // the weakest sign.
     std::vector<std::string> by_preference = names_;
-    std::stable_partition(by_preference.begin(), by_preference.end(),
-                          [&](const std::string& name) { return readings_[name].preferred; });
+    const auto rank = [&](const std::string& name) {
+      const ColumnReading& r = readings_[name];
+      return r.preferred ? 2 : r.measured || r.side == Side::motor ? 1 : 0;
+    };
+    std::stable_sort(by_preference.begin(), by_preference.end(),
+                     [&](const std::string& a, const std::string& b) { return rank(a) > rank(b); });
     for (const bool by_unit_only : {false, true})
       for (const std::string& name : by_preference)
         if (is_free(name)) take(name, by_unit_only, current);

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <initializer_list>
+#include <span>
 #include <utility>
 
 #include "host/input/data/units.hpp"
@@ -12,6 +13,20 @@ namespace flexspline::project {
 namespace {
 
 using data::Quantity;
+using Words = std::span<const std::string_view>;
+
+constexpr std::string_view kSetPoint[] = {"ref",      "reference", "cmd",     "command", "commanded", "set",
+                                          "setpoint", "target",    "desired", "des",     "sp",        "demand",
+                                          "soll",     "sollwert",  "goal",    "d"};
+constexpr std::string_view kMeasured[] = {"present", "actual", "act",     "meas",     "measured",
+                                          "msr",     "ist",    "istwert", "feedback", "fbk"};
+constexpr std::string_view kPosition[] = {"position", "pos",    "angle",  "q",      "theta", "phi",       "enc",
+                                          "encoder",  "x",      "actpos", "winkel", "lage",  "qm",        "ql",
+                                          "thetam",   "thetal", "phim",   "phil",   "alpha", "positions", "angles"};
+constexpr std::string_view kVelocity[] = {"velocity", "vel",  "speed",   "omega",    "w",      "qd",
+                                          "dq",       "qdot", "rpm",     "erpm",     "dtheta", "wm",
+                                          "wl",       "dqm",  "actvelo", "drehzahl", "velo",   "geschwindigkeit",
+                                          "dql",      "qdm",  "qdl",     "thetadot", "phidot", "velocities"};
 
 // "motorPos_rad/s" to motor, pos, rad, s.
 std::vector<std::string> words_of(std::string_view name) {
@@ -32,13 +47,22 @@ std::vector<std::string> words_of(std::string_view name) {
   return words;
 }
 
-bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted);
 Kind kind_of_words(const std::vector<std::string>& words);
+
+bool has_any(const std::vector<std::string>& words, Words wanted) {
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+    return std::find(wanted.begin(), wanted.end(), word) != wanted.end();
+  });
+}
+
+bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted) {
+  return has_any(words, Words(wanted.begin(), wanted.size()));
+}
 
 // German writes as one word what English writes as two: "motorposition", "abtriebsmoment".
 void split_compounds(std::vector<std::string>& words) {
   for (std::size_t k = 0; k < words.size(); ++k)
-    for (const std::string_view first : {"motor", "abtriebs", "abtrieb", "last", "gelenk"}) {
+    for (const std::string_view first : {"motor", "abtriebs", "abtrieb", "last", "gelenk", "soll", "ist"}) {
       if (!words[k].starts_with(first) || words[k].size() == first.size()) continue;
       const std::string rest = words[k].substr(first.size());
       if (kind_of_words({rest}) == Kind::none) continue;
@@ -46,12 +70,6 @@ void split_compounds(std::vector<std::string>& words) {
       words.insert(words.begin() + static_cast<std::ptrdiff_t>(k) + 1, rest);
       break;
     }
-}
-
-bool has_any(const std::vector<std::string>& words, std::initializer_list<std::string_view> wanted) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-    return std::find(wanted.begin(), wanted.end(), word) != wanted.end();
-  });
 }
 
 // Units whose usual spelling has capitals, which names of columns seldom keep.
@@ -90,7 +108,7 @@ Kind kind_of_quantity(Quantity quantity) {
   return Kind::none;
 }
 
-// "actual_q_3", "position[3]", "q3" without the number of the joint.
+// "actual_q_3", "position[3]", "q3", "MsrTrq_A3" without the number of the joint.
 std::string_view without_index(std::string_view name) {
   const bool bracket = name.ends_with(']');
   std::string_view stem = bracket ? name.substr(0, name.size() - 1) : name;
@@ -98,7 +116,15 @@ std::string_view without_index(std::string_view name) {
   if (digits == 0 || digits > 2 || digits == stem.size()) return name;
   stem.remove_suffix(digits);
   if (bracket) return stem.ends_with('[') ? stem.substr(0, stem.size() - 1) : name;
+  if (stem.size() > 2 && (stem.ends_with("_A") || stem.ends_with("_J"))) return stem.substr(0, stem.size() - 2);
   return stem.ends_with('_') || stem.ends_with('.') ? stem.substr(0, stem.size() - 1) : stem;
+}
+
+// A single letter keeps its number: "i1" to "i3" are the currents of phases.
+std::vector<std::string> words_without_index(std::string_view name) {
+  std::vector<std::string> all = words_of(name), words = words_of(without_index(name));
+  const bool is_letter = !words.empty() && words.size() == all.size() && words.back().size() == 1;
+  return is_letter && words.back() != "q" ? all : words;
 }
 
 std::optional<int> index_of(std::string_view name) {
@@ -121,6 +147,7 @@ std::string_view before_brackets(std::string_view name) {
 Side side_by_letter(const std::string& name, Kind kind, const std::vector<std::string>& names) {
   const std::string_view stem = before_brackets(without_index(name));
   std::vector<std::string> words = words_of(stem);
+  std::erase(words, "dot");
   if (words.size() > 2 && !unit_of_word(words.back()).empty() && words.back() != "m") words.pop_back();
   if (words.size() < 2 || (words.back() != "m" && words.back() != "l")) return Side::open;
   const Side side = words.back() == "m" ? Side::motor : Side::link;
@@ -132,6 +159,21 @@ Side side_by_letter(const std::string& name, Kind kind, const std::vector<std::s
   std::string other = name;
   other[at] = side == Side::motor ? (other[at] == 'M' ? 'L' : 'l') : (other[at] == 'L' ? 'M' : 'm');
   return std::find(names.begin(), names.end(), other) != names.end() ? side : Side::open;
+}
+
+Side side_by_words(const std::vector<std::string>& words) {
+  const bool link = has_any(words, {"output",  "out",      "joint", "link",   "load", "arm",    "flange",
+                                    "abtrieb", "abtriebs", "last",  "gelenk", "ql",   "thetal", "phil",
+                                    "wl",      "dql",      "taul",  "jnt",    "jp",   "jv",     "jt"}) ||
+                    (has_any(words, {"actual", "target"}) && has_any(words, {"q", "qd"}));
+  const bool motor = has_any(words, {"motor", "mot", "rotor", "wg", "qm", "thetam", "phim", "wm", "dqm", "taum", "im"});
+  return motor ? Side::motor : link ? Side::link : Side::open;
+}
+
+// What a robot computes from its measured torque and a model of its own: no torque that is known.
+bool is_estimate_of_external_torque(const std::vector<std::string>& words) {
+  return has_any(words, {"ext", "external"}) &&
+         has_any(words, {"hat", "est", "estimate", "estimated", "trq"});  // KUKA's ExtTrq
 }
 
 // The torque between motor and link, as texts on joints with an elastic gear and libfranka call it.
@@ -162,17 +204,40 @@ Kind kind_of_words(const std::vector<std::string>& words) {
   if (has_any(words,
               {"time", "t", "timestamp", "zeit", "tout", "ts", "stamp", "uhrzeit", "timestamps", "duration", "today"}))
     return Kind::time;
-  if (has_any(words, {"temperature", "temp", "temperatur"})) return Kind::temperature;
-  if (has_any(words,
-              {"velocity", "vel",      "speed", "omega",           "w",  "qd", "dq",  "qdot", "rpm", "erpm", "dtheta",
-               "actvelo",  "drehzahl", "velo",  "geschwindigkeit", "wm", "wl", "dqm", "dql",  "qdm", "qdl"}))
-    return Kind::velocity;
-  if (has_any(words, {"torque", "force", "tau", "moment", "effort", "trq", "tq", "drehmoment", "taum", "taul"}))
+  if (has_any(words, {"temperature", "temp", "temperatur", "temperatures"})) return Kind::temperature;
+  // "theta_dot"; the derivative of anything else is no quantity that is used.
+  if (has_any(words, {"dot"}))
+    return has_any(words, kPosition) && !has_any(words, kVelocity) ? Kind::velocity : Kind::none;
+  if (has_any(words, kVelocity)) return Kind::velocity;
+  if (has_any(words, {"torque", "force", "tau", "moment", "effort", "trq", "tq", "drehmoment", "taum", "taul",
+                      "torques", "efforts"}))
     return Kind::torque;
-  if (has_any(words, {"current", "iq", "i", "cur", "amps", "strom", "im", "curr"})) return Kind::current;
-  if (has_any(words, {"position", "pos", "angle", "q", "theta", "phi", "enc", "encoder", "x", "actpos", "winkel",
-                      "lage", "qm", "ql", "thetam", "thetal", "phim", "phil", "alpha"}))
-    return Kind::position;
+  if (has_any(words, {"current", "iq", "i", "cur", "amps", "strom", "im", "curr", "currents"})) return Kind::current;
+  if (has_any(words, kPosition)) return Kind::position;
+  return Kind::none;
+}
+
+struct Symbol {
+  std::string_view word;
+  Kind kind;
+};
+// Barrett's libraries log position, velocity and torque of the joint so.
+constexpr Symbol kJointSymbols[] = {{"jp", Kind::position}, {"jv", Kind::velocity}, {"jt", Kind::torque}};
+// Drives with the MIT's protocol log so; elsewhere these letters are power or pressure, and voltage.
+constexpr Symbol kMotorSymbols[] = {{"p", Kind::position}, {"v", Kind::velocity}};
+
+// What a name means that is one symbol, perhaps with the word for a set point or a measured value; `names` of all
+// columns: p and v count only together and next to tau.
+Kind kind_of_symbol(std::vector<std::string> words, const std::vector<std::string>& names) {
+  std::erase_if(words, [](const std::string& word) {
+    return word != "d" && (has_any({word}, Words(kSetPoint)) || has_any({word}, Words(kMeasured)));
+  });
+  if (words.size() != 1) return Kind::none;
+  for (const Symbol& symbol : kJointSymbols)
+    if (words[0] == symbol.word) return symbol.kind;
+  const auto is_there = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  for (const Symbol& symbol : kMotorSymbols)
+    if (words[0] == symbol.word && is_there("p") && is_there("v") && is_there("tau")) return symbol.kind;
   return Kind::none;
 }
 
@@ -190,7 +255,7 @@ std::string usual_unit(const std::string& name, const std::vector<std::string>& 
 
 ColumnReading read_name(const std::string& name, const std::string& stated_unit,
                         const std::vector<std::string>& names) {
-  std::vector<std::string> words = words_of(name);
+  std::vector<std::string> words = words_without_index(name);
   split_compounds(words);
   ColumnReading r;
   r.unit = stated_unit.empty() ? unit_in_name(name) : stated_unit;
@@ -201,12 +266,16 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
   if (r.unit.empty()) r.unit = usual_unit(name, words);
   r.electrical = has_any(words, {"erpm"});
   const auto unit = data::unit_from_text(r.unit);
-  if (has_any(words, {"error", "err",  "index",   "voltage", "volt",         "volts", "pwm", "status", "flag",
-                      "mode",  "acc",  "counter", "accel",   "acceleration", "qdd",   "ddq", "jerk",   "power",
-                      "id",    "duty", "tcp",     "battery", "fault",        "pose",  "bus", "wrench", "cartesian",
-                      "gyro",  "gnss", "imu",     "seq",     "nsec",         "nsecs", "gps", "watt",   "mos"}))
+  if (has_any(words,
+              {"error", "err",     "index", "voltage",      "volt", "volts",  "pwm",       "status", "flag", "mode",
+               "acc",   "counter", "accel", "acceleration", "qdd",  "ddq",    "jerk",      "power",  "id",   "duty",
+               "tcp",   "battery", "fault", "pose",         "bus",  "wrench", "cartesian", "gyro",   "gnss", "imu",
+               "seq",   "nsec",    "nsecs", "gps",          "watt", "mos",    "ddot"}))
     return r;
   r.kind = kind_of_words(words);
+  if (r.kind == Kind::none) r.kind = kind_of_symbol(words, names);
+  // "T_housing_degC" is no time.
+  if (r.kind == Kind::time && unit && unit->quantity == Quantity::temperature) r.kind = Kind::temperature;
   // "q_A" is a current, and no angle.
   if (r.kind == Kind::position && unit && unit->quantity == Quantity::current) r.kind = Kind::current;
   // Of the supply: "current_in"; but "Iq_in_mA".
@@ -226,21 +295,19 @@ ColumnReading read_name(const std::string& name, const std::string& stated_unit,
     r.kind = Kind::none;
   // Of the current that makes no torque.
   if (r.kind == Kind::current && has_any(words, {"d"})) r.kind = Kind::none;
-  r.set_point = has_any(words, {"ref", "reference", "cmd", "command", "commanded", "set", "setpoint", "target",
-                                "desired", "des", "sp", "demand", "soll", "d"});
-  const bool link = has_any(words, {"output", "out", "joint", "link", "load", "arm", "flange", "abtrieb", "abtriebs",
-                                    "last", "gelenk", "ql", "thetal", "phil", "wl", "dql", "taul"}) ||
-                    (has_any(words, {"actual", "target"}) && has_any(words, {"q", "qd"}));
-  const bool motor = has_any(words, {"motor", "mot", "rotor", "wg", "qm", "thetam", "phim", "wm", "dqm", "taum", "im"});
-  r.side = motor ? Side::motor : link ? Side::link : side_by_letter(name, r.kind, names);
+  r.set_point = has_any(words, kSetPoint);
+  r.measured = !r.set_point && has_any(words, kMeasured);
+  r.side = side_by_words(words);
+  if (r.side == Side::open) r.side = side_by_letter(name, r.kind, names);
   if (r.side == Side::open) r.side = side_by_joint_symbols(words, names);
   if (unit && kind_of_quantity(unit->quantity) != r.kind) r.unit.clear();
   // The last letter gave the side, so it is not a unit.
   if (r.side == Side::motor && r.unit == "m" && stated_unit.empty() && before_brackets(name).size() == name.size())
     r.unit.clear();
   r.external = has_any(words, {"external", "ext", "disturbance"});
-  r.sensor =
-      is_joint_torque(words) || has_any(words, {"sensor", "transducer", "measured", "gear", "gearbox", "flexspline"});
+  if (is_estimate_of_external_torque(words)) r.kind = Kind::none;
+  r.sensor = is_joint_torque(words) ||
+             has_any(words, {"sensor", "transducer", "measured", "msr", "gear", "gearbox", "flexspline"});
   return r;
 }
 

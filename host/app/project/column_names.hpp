@@ -18,6 +18,7 @@ struct ColumnReading {
   Side side = Side::open;
   bool by_unit_only = false;
   bool set_point = false;
+  bool measured = false;  // "actual", "present"
   bool external = false;
   bool sensor = false;
   bool preferred = false;   // of several of its kind: the current that makes torque

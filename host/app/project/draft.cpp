@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
@@ -44,7 +46,22 @@ std::string units_of(const std::string& ours) {
   return rotary == linear ? rotary : rotary + "; on a linear axis " + linear;
 }
 
-// `names`: the columns of all files; `first` may say why it has none of a name.
+// A number above zero: how many units the column's ones are.
+bool is_plain_number(const std::string& text) {
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc{} && stop == end && std::isfinite(value) && value > 0.0;
+}
+
+// The unit that a number alone is of: that in the name of theirs, or that of ours.
+std::string unit_of_scale(const ColumnGuess& guess, data::Axis axis) {
+  const std::string in_name = unit_in_name(guess.theirs);
+  if (!in_name.empty() && data::unit_from_text("1 " + in_name)) return in_name;
+  const std::optional<Column> column = data::column_from_name(guess.ours);
+  return std::string(data::si_unit(column ? data::quantity_of(*column, axis) : data::Quantity::time));
+}
+
 // A name that says that it is no SI value, without a unit that is known, needs one.
 void require_unit_in_name(const ColumnGuess& guess) {
   const std::string map = fmt::format("--map {}={}", guess.ours, guess.theirs);
@@ -67,6 +84,7 @@ void require_unit_in_name(const ColumnGuess& guess) {
                     map, unit, guess.ours, guess.theirs, guess.ours, units_of(guess.ours)));
 }
 
+// `names`: the columns of all files; `first` may say why it has none of a name.
 ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& names, const data::Recording& first) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
@@ -86,11 +104,12 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
   if (!is_name(guess.theirs) && colon != std::string::npos && guess.theirs.find(')', colon) == std::string::npos) {
     guess.unit = guess.theirs.substr(colon + 1);
     guess.theirs.erase(colon);
-    if (!data::unit_from_text(guess.unit))
+    if (!data::unit_from_text(guess.unit) && !is_plain_number(guess.unit))
       throw RequestError(
-          fmt::format("--map {}: the unit \"{}\" is not known; those of {} are {}, also with a number "
-                      "before them",
-                      text, guess.unit, guess.ours, units_of(guess.ours)));
+          fmt::format("--map {}: the unit \"{}\" is not known; those of {} are {}, also with a number above zero "
+                      "before them, as in --map '{}={}:0.5 {}'",
+                      text, guess.unit, guess.ours, units_of(guess.ours), guess.ours, guess.theirs,
+                      unit_of_scale(guess, data::Axis::rotary)));
   }
   if (!is_name(guess.theirs)) {
     const std::string why = first.why_not(guess.theirs);
@@ -227,6 +246,14 @@ void take_sides_of_values(HeaderGuess& guess, const data::Recording& recording, 
   for (double& w : values[2]) w *= factor_of(velocity->unit);
   const double factor = std::abs(velocity_over_slope(values[0], values[1], values[2]).value_or(1.0));
   const auto is = [&](double wanted) { return std::abs(factor / wanted - 1.0) < kSameRatio; };
+  const auto says_motor = [&](const ColumnGuess& c) {
+    return read_name(c.theirs, "", recording.names()).side == Side::motor;
+  };
+  // "theta_m" with its rate "theta_dot".
+  if (is(1.0) && guess.side_is_asked_for && (says_motor(*position) || says_motor(*velocity))) {
+    guess.side = Side::motor;
+    guess.side_is_asked_for = false;
+  }
   if (!is(ratio) && !is(1.0 / ratio)) return;
   ColumnGuess& link = is(ratio) ? *position : *velocity;
   ColumnGuess& motor = is(ratio) ? *velocity : *position;
@@ -260,6 +287,7 @@ void add_stated_facts(Draft& draft, const Request& request) {
   if (request.torque_constant_nm_a)
     draft.toml.drive["torque_constant_nm_a"] = number_value(*request.torque_constant_nm_a);
   if (request.pole_pairs) draft.toml.drive["pole_pairs"] = number_value(*request.pole_pairs);
+  if (request.pitch_m) draft.toml.drive["pitch_m"] = number_value(*request.pitch_m);
   if (request.encoder_counts) draft.toml.defaults["encoder_counts"] = number_value(*request.encoder_counts);
 }
 
@@ -361,6 +389,8 @@ HeaderGuess guess_of_files(const LoggedFiles& logged, const Request& request) {
   for (const Lengths& of_file : logged.lengths)
     add_new(table_with(time != nullptr ? time->theirs : "time_s", of_file), of_one_table);
   HeaderGuess guess = guess_columns(logged_columns(of_one_table, *logged.first), stated, how);
+  for (ColumnGuess& c : guess.columns)
+    if (is_plain_number(c.unit)) c.unit += " " + unit_of_scale(c, guess.axis);
   if (request.joint && std::find(guess.joints.begin(), guess.joints.end(), *request.joint) == guess.joints.end())
     throw RequestError(fmt::format("--joint {}: {}", *request.joint,
                                    guess.joints.empty()
@@ -391,6 +421,9 @@ Draft draft_of_files(const std::vector<fs::path>& files, const Request& request)
   const LoggedFiles logged = open_files(files, draft);
   const HeaderGuess guess = guess_of_files(logged, request);
   take_columns(draft, guess);
+  if (request.pitch_m && guess.axis != data::Axis::linear)
+    throw RequestError(fmt::format("--pitch-m {:g}: the axis is rotary; give --axis linear with it, or leave it out",
+                                   *request.pitch_m));
   if (guess.axis == data::Axis::linear || !request.axis.empty()) {
     draft.toml.drive["axis"] = text_value(guess.axis == data::Axis::linear ? "linear" : "rotary");
     if (!guess.axis_why.empty()) {

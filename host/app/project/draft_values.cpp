@@ -157,6 +157,10 @@ void take_facts_of_values(Draft& draft, data::Dataset& dataset) {
     draft.notes.push_back(
         "the torque constant is not known: torques come out in amperes; give --torque-constant, or write "
         "torque_constant_nm_a under [drive]");
+  if (dataset.drive.axis == data::Axis::linear && !dataset.drive.pitch_m)
+    draft.notes.push_back(
+        "the pitch is not known: ripples per motor turn are not tried; give --pitch-m METRES, or write pitch_m under "
+        "[drive] (a linear motor has none)");
   const bool one_part = dataset.experiments.size() == 1 && draft.toml.experiments.size() == 1 &&
                         !draft.toml.experiments.front().from_s && !draft.toml.experiments.front().to_s;
   if (one_part && dataset.experiments.front().role == data::Role::fit) {
@@ -203,6 +207,9 @@ std::string text_of(const Draft& draft, const fs::path& folder) {
     text += "# gear_ratio = 100             # motor turns per output turn\n";
   if (draft.toml.drive.count("torque_constant_nm_a") == 0)
     text += "# torque_constant_nm_a = 0.05  # where the effort is a current\n";
+  const auto axis = draft.toml.drive.find("axis");
+  if (axis != draft.toml.drive.end() && axis->second.text == "linear" && draft.toml.drive.count("pitch_m") == 0)
+    text += "# pitch_m = 0.01               # travel of one motor turn\n";
   for (const auto& [key, value] : draft.toml.defaults) text += key_line(key, value) + "\n";
   for (const auto& [ours, mapping] : draft.toml.columns) {
     const auto comment = draft.comments.find(ours);

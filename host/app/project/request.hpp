@@ -23,6 +23,7 @@ struct Request {
   std::optional<double> gear_ratio;
   std::optional<double> torque_constant_nm_a;
   std::optional<double> encoder_counts;
+  std::optional<double> pitch_m;  // of a linear axis: travel of one motor turn
 };
 
 // What is requested does not fit together, or a question is open: "what; what to do".
