@@ -93,6 +93,9 @@ TEST(RobotNames, ATextIsNotSuggestedForASignalThatIsMissing) {
   const Answer answer = shell.run("flexspline new --from log.csv --out project");
   EXPECT_EQ(answer.code, 2);
   EXPECT_TRUE(contains(answer.err, "--map current_a=kappa")) << answer.err;
+  // Nor taken for one by its name.
+  const std::string said = taken(shell, "time,position,current_state,current\n" + log.substr(log.find('\n') + 1));
+  EXPECT_TRUE(contains(said, "current_a: \"current\"")) << said;
 }
 
 }  // namespace

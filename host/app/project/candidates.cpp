@@ -4,7 +4,6 @@
 #include <map>
 
 #include "host/common/text/nearest.hpp"
-#include "host/input/data/recording.hpp"
 
 namespace flexspline::project {
 namespace {
@@ -13,11 +12,13 @@ bool is_in(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// Names of columns that hold text; each table of a file has columns of one length.
-std::vector<std::string> texts_in(const data::Recording& recording, const std::vector<std::string>& wanted) {
+}  // namespace
+
+std::vector<std::string> texts_in(const data::Recording& recording, const std::vector<std::string>& names) {
+  // Each table of a file has columns of one length.
   std::map<std::size_t, std::vector<std::size_t>> tables;
   for (std::size_t i = 0; i < recording.names().size(); ++i)
-    if (is_in(wanted, recording.names()[i])) tables[recording.length(i)].push_back(i);
+    if (is_in(names, recording.names()[i])) tables[recording.length(i)].push_back(i);
   std::vector<std::string> texts;
   for (const auto& [length, columns] : tables) {
     const data::Table table = recording.read(columns);
@@ -28,8 +29,6 @@ std::vector<std::string> texts_in(const data::Recording& recording, const std::v
   }
   return texts;
 }
-
-}  // namespace
 
 std::vector<Candidate> candidates_of(const Draft& draft, const Request& request) {
   if (draft.toml.experiments.empty() || draft.unused.empty()) return {};

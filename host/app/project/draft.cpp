@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "host/app/project/candidates.hpp"
 #include "host/common/text/nearest.hpp"
 #include "host/input/data/record_summary.hpp"
 #include "host/input/data/recording.hpp"
@@ -383,12 +384,19 @@ GuessOptions guess_options(const Request& request, const std::vector<std::string
 HeaderGuess guess_of_files(const LoggedFiles& logged, const Request& request) {
   std::vector<ColumnGuess> stated;
   for (const std::string& text : request.map) stated.push_back(mapping_of(text, logged.names, *logged.first));
-  const GuessOptions how = guess_options(request, logged.names);
+  GuessOptions how = guess_options(request, logged.names);
   const ColumnGuess* time = find(stated, "time_s");
   std::vector<std::string> of_one_table;
   for (const Lengths& of_file : logged.lengths)
     add_new(table_with(time != nullptr ? time->theirs : "time_s", of_file), of_one_table);
   HeaderGuess guess = guess_columns(logged_columns(of_one_table, *logged.first), stated, how);
+  // Text is no measurement, whatever its name, where another column may be it; else the text is reported.
+  std::vector<std::string> guessed;
+  for (const ColumnGuess& c : guess.columns)
+    if (!c.why.empty()) guessed.push_back(c.theirs);
+  add_new(texts_in(*logged.first, guessed), how.without);
+  HeaderGuess of_numbers = guess_columns(logged_columns(of_one_table, *logged.first), stated, how);
+  if (of_numbers.columns.size() == guess.columns.size()) guess = std::move(of_numbers);
   for (ColumnGuess& c : guess.columns)
     if (is_plain_number(c.unit)) c.unit += " " + unit_of_scale(c, guess.axis);
   if (request.joint && std::find(guess.joints.begin(), guess.joints.end(), *request.joint) == guess.joints.end())
