@@ -220,13 +220,13 @@ class Control {
   // ends.
   [[gnu::noinline]] void start(const Demand& demand, const Estimate& e) {
     const bool goes_on =
-        uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.mode != control::Mode::off;
+        uses_trajectory(last_mode_) && uses_trajectory(demand.mode) && loops_.loop != control::Loop::off;
     if (!goes_on) {
       trajectory_ = control::Trajectory::moving<N>(p_.trajectory, e.angle.raw,
                                                    control::Trajectory::speed_of<N>(p_.trajectory, e.velocity));
     }
     if (demand.mode == Mode::excitation) control::Excitation::start<N>(excitation_, p_.excitation);
-    loops_.mode = control::Mode::off;
+    loops_.loop = control::Loop::off;
     feedforward_ = {};
     nominal_ = {};
     torsion_ = {};
@@ -261,17 +261,17 @@ class Control {
     control::Loops::Command<N> command;
     switch (demand.mode) {
       case Mode::current:
-        command.mode = control::Mode::torque;
+        command.loop = control::Loop::torque;
         command.torque = N::scaled(p_.torque_of_current, N::clamp(demand.current, p_.loops.current_limit));
         break;
       case Mode::velocity:
       case Mode::stop:
         follow_velocity(demand.mode == Mode::stop ? N::Value{} : demand.velocity, e, out);
-        command = {control::Mode::velocity, {}, out.velocity, {}};
+        command = {control::Loop::velocity, {}, out.velocity, {}};
         break;
       case Mode::position:
         follow_position(demand, out);
-        command = {control::Mode::position, out.position, out.velocity, {}};
+        command = {control::Loop::position, out.position, out.velocity, {}};
         break;
       case Mode::excitation:
         command = excite(e, out);
@@ -366,9 +366,9 @@ class Control {
   [[gnu::noinline]] control::Loops::Command<N> excite(const Estimate& e, Output& out) {
     const auto set_point = control::Excitation::update<N>(excitation_, p_.excitation, e.velocity);
     out.finished = control::Excitation::finished<N>(excitation_);
-    if (p_.excites_torque) return {control::Mode::torque, {}, {}, set_point};
+    if (p_.excites_torque) return {control::Loop::torque, {}, {}, set_point};
     out.velocity = set_point;
-    return {control::Mode::velocity, {}, set_point, {}};
+    return {control::Loop::velocity, {}, set_point, {}};
   }
   void compensate(const Estimate& e, std::uint32_t due, Output& out, control::Loops::Command<N>& command) {
     const auto forward = control::Feedforward::update<N>(feedforward_, p_.feedforward, p_.model,

@@ -70,8 +70,9 @@ class ThreePhaseStageOf {
 
   void command(const Actuation& actuation) {
     const control::foc::RotorVector wanted = {0, signed_by_encoder(actuation.current * s_.set_point)};
-    const control::foc::Limits l = control::foc::limit_currents(
-        limits_, s_.limits, wanted, {out_.measured.d, out_.measured.q}, out_.wanted, out_.most, s_.foc.current.up);
+    const control::foc::Limits l =
+        control::foc::limit_currents(limits_, s_.limits, wanted, {out_.measured.d, out_.measured.q}, out_.wanted,
+                                     out_.most, s_.foc.current.voltage_exponent);
     set_point_.d = l.set_point.d;
     set_point_.q = l.set_point.q;
     commanded_ = actuation.enabled;

@@ -12,7 +12,7 @@
 #include "boards/stm32f4/three_phase_board.hpp"
 #include "boards/stm32f4/usb_link.hpp"
 #include "firmware/application.hpp"
-#include "firmware/drive.hpp"
+#include "firmware/main_loop.hpp"
 #include "firmware/parameter_lock.hpp"
 #include "firmware/serial_link.hpp"
 #include "firmware/service.hpp"
@@ -94,7 +94,7 @@ class Drive {
       static firmware::UpdateWatch<boot::Slots<ImageMemory>> update(slots, Board::kTickHz);
       using Usb = UsbLink<Service, OtgFs, UsbDevice, UsbReports>;
       static Usb usb_link(service, port, device, usb);
-      firmware::Drive<Application, Service, Usb, SerialLink> drive(application_, service, usb_link, serial_link);
+      firmware::MainLoop<Application, Service, Usb, SerialLink> drive(application_, service, usb_link, serial_link);
       board_.start_tick();
       for (;;) {
         drive.poll();
@@ -106,7 +106,7 @@ class Drive {
         wait_for_interrupt();
       }
     } else {
-      firmware::Drive<Application, Service, SerialLink> drive(application_, service, serial_link);
+      firmware::MainLoop<Application, Service, SerialLink> drive(application_, service, serial_link);
       board_.start_tick();
       for (;;) {
         drive.poll();

@@ -17,7 +17,7 @@ struct TwinOptions {
   std::string wiring_fault;       ///< of that motor, such as phase-open-b
   std::string motor_ripple;       ///< of that motor: board::motor_ripple_names()
   double motor_ripple_size = 1.0;
-  std::string json_file;   ///< receives its address, once it listens; - is standard output
+  std::string json_file;        ///< receives its address, once it listens; - is standard output
   std::string link_fault_file;  ///< unplugs its link (link_fault.hpp); empty: none
   std::string inject;
   double inject_at_s = 1.0;  ///< after the drive was first armed

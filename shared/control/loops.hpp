@@ -1,14 +1,14 @@
 // Cascaded loops of a drive: position (P), velocity (PI) and the command to the current controller, with limits of
 // velocity, torque and current that hold for any input. Per unit; k counts ticks of T seconds, clamp(x, a) limits x to
 // -a..a:
-//   w_ref = clamp(Kp (q_ref - q) + w_ff, w_limit)                           mode position
-//   w_ref = clamp(w_ff, w_limit)                                            mode velocity
+//   w_ref = clamp(Kp (q_ref - q) + w_ff, w_limit)                           position loop
+//   w_ref = clamp(w_ff, w_limit)                                            velocity loop
 //   e[k]  = w_ref - w
-//   u[k]  = Kv e[k] + x[k] + t_ff                                           mode torque: u[k] = t_ff
+//   u[k]  = Kv e[k] + x[k] + t_ff                                           torque alone: u[k] = t_ff
 //   t[k]  = u[k] limited to low..high of SpeedGuard at w, within -t_limit..t_limit
 //   x[k+1] = clamp(x[k] + Ki T e[k], t_limit), but x[k] where t[k] is limited and e[k] would push it further
 //   i[k]  = clamp(t[k]/Km, i_limit)
-// When a loop closes, or the mode changes, x is set so that t[k] is what t[k-1] was: x = t[k-1] - Kv e[k] - t_ff.
+// When a loop closes, or another one does, x is set so that t[k] is what t[k-1] was: x = t[k-1] - Kv e[k] - t_ff.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace flexspline::control {
 
-enum class Mode : std::uint8_t { off, torque, velocity, position };
+enum class Loop : std::uint8_t { off, torque, velocity, position };
 
 // In SI units at the motor.
 template <class P>
@@ -55,13 +55,13 @@ struct Loops {
   struct State {
     typename N::State integral{};
     typename N::Value torque{};  // of the previous tick
-    Mode mode = Mode::off;
+    Loop loop = Loop::off;
   };
-  // The demand. In mode velocity `velocity` is the set point; in mode position `velocity` is the feedforward of it;
-  // `torque` is the set point in mode torque, otherwise the feedforward.
+  // The demand. Of the velocity loop `velocity` is the set point, of the position loop its feedforward; `torque`
+  // is the set point where no loop is closed, else the feedforward.
   template <class N>
   struct Command {
-    Mode mode = Mode::off;
+    Loop loop = Loop::off;
     typename N::Angle position{};
     typename N::Value velocity{};
     typename N::Value torque{};
@@ -70,7 +70,7 @@ struct Loops {
   struct Output {
     typename N::Value torque{};   // of torque_base
     typename N::Value current{};  // of current_base, for the current controller
-    typename N::Value error{};    // of the velocity; zero in mode torque
+    typename N::Value error{};    // of the velocity; zero where no loop is closed
     bool limited = false;         // the loops reached a limit
   };
 
@@ -97,11 +97,12 @@ struct Loops {
   }
 
   // One tick: returns the torque and the current to command. `angle` and `velocity` are measured. Bumpless in every
-  // change of mode as far as the integral, which is within the torque limit, allows; mode off gives zero at once.
+  // change of the loop as far as the integral, which is within the torque limit, allows; without a loop and a torque
+  // (off) it is zero at once.
   template <class N>
   static constexpr Output<N> update(State<N>& s, const Coefficients<N>& c, const Command<N>& command,
                                     typename N::Angle angle, typename N::Value velocity) {
-    if (command.mode == Mode::off) {
+    if (command.loop == Loop::off) {
       s = {};
       return {};
     }
@@ -109,19 +110,19 @@ struct Loops {
     const auto feedforward = N::clamp(command.torque, c.largest_torque);
     typename N::Value error{};
     auto torque = feedforward;
-    if (command.mode != Mode::torque) {
+    if (command.loop != Loop::torque) {
       error = velocity_set_point<N>(c, command, angle) - w;
       // Within eight, in addition to four of the feedforward and two of the integral: the sum fits a value, and where
       // it was clamped it is beyond every limit.
       const auto proportional = N::clamp(N::scaled(c.velocity, error), most_proportional<N>());
-      if (command.mode != s.mode) s.integral = bumpless_integral<N>(c, s.torque, proportional, feedforward);
+      if (command.loop != s.loop) s.integral = bumpless_integral<N>(c, s.torque, proportional, feedforward);
       torque = torque + N::narrow(s.integral) + proportional;
     }
-    s.mode = command.mode;
+    s.loop = command.loop;
     const auto bounds = SpeedGuard::bounds_within<N>(c.guard, w);
     const bool above = torque > bounds.high, below = torque < bounds.low;
     s.torque = above ? bounds.high : below ? bounds.low : torque;
-    if (command.mode != Mode::torque && !(above && error > typename N::Value{}) &&
+    if (command.loop != Loop::torque && !(above && error > typename N::Value{}) &&
         !(below && error < typename N::Value{}))
       s.integral = N::clamp(s.integral + N::times(N::widen(error), c.integral), c.torque_limit);
     return {s.torque, N::clamp(N::scaled(c.current, s.torque), c.current_limit), error, above || below};
@@ -132,7 +133,7 @@ struct Loops {
   static constexpr typename N::Value velocity_set_point(const Coefficients<N>& c, const Command<N>& command,
                                                         typename N::Angle angle) {
     const auto forward = N::clamp(command.velocity, c.largest_velocity);
-    if (command.mode == Mode::velocity) return N::clamp(forward, c.velocity_limit);
+    if (command.loop == Loop::velocity) return N::clamp(forward, c.velocity_limit);
     // Within four and four: the sum fits a state.
     const auto from_position = N::narrow(N::signal(c.position, command.position - angle));
     return N::clamp(from_position + forward, c.velocity_limit);

@@ -32,10 +32,15 @@ struct MotorSettings {
     c.ticks(pole_pairs), c(reversed), c.number(offset_angle), c.counts(encoder_counts);
     for (std::int32_t* x : {&gain.a, &gain.b, &gain.c}) c.positive(*x);
     for (foc::AxisSettings* a : {&current.d, &current.q}) {
-      for (std::int32_t* x : {&a->proportional, &a->integral, &a->resistance, &a->slope, &a->per_slope}) c.positive(*x);
-      for (std::int32_t* x : {&a->beyond, &a->weight, &a->pending, &a->reactance}) c.signed_word(*x);
+      for (std::int32_t* x :
+           {&a->proportional, &a->integral, &a->resistance, &a->volts_per_change, &a->change_per_volt})
+        c.positive(*x);
+      for (std::int32_t* x :
+           {&a->half_period_gain_less_one, &a->sample_weight_less_one, &a->pending_gain, &a->reactance})
+        c.signed_word(*x);
     }
-    for (std::int32_t* x : {&current.flux, &current.pull, &current.integral_limit, &current.up, &circle})
+    for (std::int32_t* x :
+         {&current.flux, &current.response_per_period, &current.integral_limit, &current.voltage_exponent, &circle})
       c.positive(*x);
     for (std::int32_t* x : {&resistance, &inductance_d, &inductance_q, &flux}) c.positive(*x);
     c.ticks(bandwidth_mhz);
@@ -44,12 +49,13 @@ struct MotorSettings {
 
 // Beyond the bounds of single fields: what the arithmetic of the current loop stands on.
 constexpr bool agrees(const MotorSettings& m) {
-  constexpr std::int32_t kLeastGain = 2048, kMostGain = 8191, kLeastUp = 5, kMostUp = 25;
+  constexpr std::int32_t kLeastGain = 2048, kMostGain = 8191, kLeastExponent = 5, kMostExponent = 25;
   for (const std::int32_t gain : {m.gain.a, m.gain.b, m.gain.c})
     if (gain < kLeastGain || gain > kMostGain) return false;
   for (const foc::AxisSettings* a : {&m.current.d, &m.current.q})
-    if (a->beyond > 0 || a->pending < 0 || a->reactance < 0) return false;
-  return m.pole_pairs <= MotorSettings::kMostPolePairs && m.current.up >= kLeastUp && m.current.up <= kMostUp;
+    if (a->half_period_gain_less_one > 0 || a->pending_gain < 0 || a->reactance < 0) return false;
+  return m.pole_pairs <= MotorSettings::kMostPolePairs && m.current.voltage_exponent >= kLeastExponent &&
+         m.current.voltage_exponent <= kMostExponent;
 }
 
 }  // namespace flexspline::control

@@ -175,7 +175,7 @@ inline constexpr std::array<FaultText, kFaults> kFaultTexts{{
      "the other way, a coupling slips, or the gear ratio is wrong (output_stuck)"},
     {"set_point_lost", "the host is there, but the stream of set points ended in motion (host_s)"},
     {"amplifier_fault", "the amplifier switched itself off: its overcurrent protection or its supply tripped"},
-    {"crashed", "the drive was reset by itself: an exception (a failure of firmware or memory), or its crystal died"},
+    {"crashed", "the drive was reset by itself: an exception (a failure of firmware or memory), or its crystal failed"},
 }};
 // Why a three-phase power stage switched itself off.
 inline constexpr std::array<FaultText, kStageFaults> kStageFaultTexts{{
@@ -186,7 +186,7 @@ inline constexpr std::array<FaultText, kStageFaults> kStageFaultTexts{{
      "the bus voltage is above its range: the motor gave back more than supply and brake resistor take, or the supply "
      "is wrong"},
     {"overcurrent",
-     "a phase's current is above the power stage's limit: phases shorted, or a current loop that swings"},
+     "a phase's current is above the power stage's limit: phases shorted, or a current loop that oscillates"},
     {"current_sum",
      "the phase currents do not add up to zero: a phase is shorted to ground, or a current sensor broken"},
     {"driver", "the gate driver reports a fault: a short, its supply, or a switch broken"},

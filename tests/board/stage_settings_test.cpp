@@ -35,11 +35,11 @@ void expect_axis(const control::foc::AxisSettings& a, const control::foc::AxisSe
   expect_near(a.proportional, b.proportional);
   expect_near(a.integral, b.integral);
   expect_near(a.resistance, b.resistance);
-  expect_near(a.slope, b.slope);
-  expect_near(a.per_slope, b.per_slope);
-  expect_near(a.beyond, b.beyond);
-  expect_near(a.weight, b.weight);
-  expect_near(a.pending, b.pending);
+  expect_near(a.volts_per_change, b.volts_per_change);
+  expect_near(a.change_per_volt, b.change_per_volt);
+  expect_near(a.half_period_gain_less_one, b.half_period_gain_less_one);
+  expect_near(a.sample_weight_less_one, b.sample_weight_less_one);
+  expect_near(a.pending_gain, b.pending_gain);
   expect_near(a.reactance, b.reactance);
 }
 constexpr double kPwmHz = 20e3, kShortestPulseS = 0.3e-6, kSamplingWindowS = 3e-6;
@@ -63,7 +63,7 @@ void expect_settings(const firmware::ThreePhaseSettings& s, const StageNumbers& 
   expect_axis(s.foc.current.d, made.current.d);
   expect_axis(s.foc.current.q, made.current.q);
   expect_near(s.foc.current.flux, made.current.flux);
-  EXPECT_EQ(s.foc.current.up, made.current.up);
+  EXPECT_EQ(s.foc.current.voltage_exponent, made.current.voltage_exponent);
   expect_modulation(s.foc.modulation, made.modulation);
   EXPECT_EQ(s.foc.sensors.two, n.two_sensors);
 
@@ -159,7 +159,7 @@ TEST(BoardStageSettings, OfTheOdrive) {
   EXPECT_EQ(s.protection.chopper.cooling, chopper.cooling);
   // The low sides of both shunts are always on for the sampling window.
   const double window = std::ldexp(s.foc.modulation.window, -control::foc::kDutyBits);
-  const double circle = std::ldexp(s.foc.circle, -26 + s.foc.current.up - 5);
+  const double circle = std::ldexp(s.foc.circle, -26 + s.foc.current.voltage_exponent - 5);
   EXPECT_NEAR(circle, (1.0 - window) / std::sqrt(3.0), 1e-6);
 }
 

@@ -49,7 +49,7 @@ foc::Inputs random_inputs() {
 [[gnu::noinline, gnu::flatten]] void current_limits_tick(const foc::Inputs& in, const foc::Outputs& out,
                                                          foc::Limits& limits) {
   limits = foc::limit_currents(limit_state, limit_settings, in.set_point, out.measured, out.wanted, out.most,
-                               loop.settings.current.up);
+                               loop.settings.current.voltage_exponent);
 }
 [[gnu::noinline]] void nothing(const foc::Inputs& in, foc::Outputs& out) {
   asm volatile("" : : "r"(&in), "r"(&out) : "memory");

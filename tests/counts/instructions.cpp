@@ -90,7 +90,7 @@ void measure(const char* name, Tick&& tick, bool say_it = true) {
   for (int k = 0; k < kTicks; ++k) {
     const Inputs<Fixed> in = random_inputs();
     Loops::Command<Fixed> command;
-    command.mode = control::Mode::position;
+    command.loop = control::Loop::position;
     command.position.raw = in.angle.raw + (random_signal() >> 4);
     command.velocity.raw = random_signal();
     const std::uint32_t before = bare::counted();

@@ -322,7 +322,7 @@ TEST(Feedforward, SavesTheLoopsSevenEighthsOfTheFollowingError) {
     for (int k = 0; k < 48'000; ++k) {
       const auto set = control::Trajectory::update(place, path, k > 3000 && k < 24'000 ? std::int64_t{5} << 32 : 0);
       const fixed::Angle here = angle(motor.turns);
-      control::Loops::Command<Fixed> command{control::Mode::position, begin, set.velocity, {}};
+      control::Loops::Command<Fixed> command{control::Loop::position, begin, set.velocity, {}};
       const auto out =
           Feedforward::update(ahead, c, model, {set.position, set.velocity, set.acceleration}, {here, {}, {}});
       if (with_feedforward) command.torque = out.torque;

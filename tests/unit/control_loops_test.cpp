@@ -16,9 +16,9 @@
 namespace flexspline::tests::control_loops_test {
 namespace {
 
+using control::Loop;
 using control::Loops;
 using control::LoopSetup;
-using control::Mode;
 using fixed::Checked;
 using fixed::Fixed;
 using fixed::OverflowLog;
@@ -58,7 +58,7 @@ double real(fixed::Value x) {
   return std::ldexp(x.raw, -fixed::kValueBits);
 }
 Loops::Command<Fixed> velocity_command(double rad_s, double feedforward = 0.0) {
-  return {Mode::velocity, {}, Fixed::value(rad_s / kVelocityBase), Fixed::value(feedforward / kTorqueBase)};
+  return {Loop::velocity, {}, Fixed::value(rad_s / kVelocityBase), Fixed::value(feedforward / kTorqueBase)};
 }
 
 // J w' = t - b w, exactly, with the torque held over a tick.
@@ -115,7 +115,7 @@ TEST(Loops, ThePositionLoopFollowsARampWithItsLagAndWithFeedforwardWithoutAny) {
       const double set = speed / kTurn * k * kTickS;
       lag = (set - motor.turns) * kTurn;
       const Loops::Command<Fixed> command{
-          Mode::position, {std::llround(std::ldexp(set, 32))}, Fixed::value(feedforward * speed / kVelocityBase), {}};
+          Loop::position, {std::llround(std::ldexp(set, 32))}, Fixed::value(feedforward * speed / kVelocityBase), {}};
       motor.tick(real(Loops::update(s, c, command, motor.angle(), motor.measured()).torque) * kTorqueBase);
     }
     EXPECT_NEAR(lag, (1.0 - feedforward) * speed / 20.0, 1e-5);
@@ -130,7 +130,7 @@ TEST(Loops, ThePositionLoopComesFromFarWithinItsVelocityAndArrives) {
     Motor motor{0.0, start};
     double fastest = 0.0;
     for (int k = 0; k < 16'000 * 15; ++k) {
-      motor.tick(real(Loops::update(s, c, {Mode::position, {}, {}, {}}, motor.angle(), motor.measured()).torque) *
+      motor.tick(real(Loops::update(s, c, {Loop::position, {}, {}, {}}, motor.angle(), motor.measured()).torque) *
                  kTorqueBase);
       fastest = std::max(fastest, std::abs(motor.velocity));
     }
@@ -185,12 +185,12 @@ TEST(Loops, AJumpThatSaturatesOvershootsFarLessThanWithoutAntiWindup) {
 
 TEST(Loops, NoTorqueAcceleratesTheMotorBeyondItsOverspeedAndOneThatIsDrivenThereIsBraked) {
   const auto c = loops<Fixed>();
-  for (const auto mode : {Mode::torque, Mode::velocity, Mode::position}) {
+  for (const auto loop : {Loop::torque, Loop::velocity, Loop::position}) {
     Loops::State<Fixed> s;
     Motor motor;
     motor.viscous = 1e-9;
     double fastest = 0.0;
-    const Loops::Command<Fixed> command{mode, {std::int64_t{1} << 60}, Fixed::value(2.0), Fixed::value(2.0)};
+    const Loops::Command<Fixed> command{loop, {std::int64_t{1} << 60}, Fixed::value(2.0), Fixed::value(2.0)};
     for (int k = 0; k < 32'000; ++k) {
       motor.tick(real(Loops::update(s, c, command, motor.angle(), motor.measured()).torque) * kTorqueBase);
       fastest = std::max(fastest, motor.velocity);
@@ -210,14 +210,14 @@ TEST(Loops, ClosingALoopAndChangingTheModeMakeNoStepOfTheTorque) {
   // Closed on a turning shaft: from zero.
   auto out = Loops::update(s, c, velocity_command(42.0), angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.0, 1e-8);
-  // Torque mode gives the commanded torque; then back.
-  out = Loops::update(s, c, {Mode::torque, {}, {}, Fixed::value(0.31)}, angle, velocity);
+  // Torque loop gives the commanded torque; then back.
+  out = Loops::update(s, c, {Loop::torque, {}, {}, Fixed::value(0.31)}, angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.31, 1e-8);
   out = Loops::update(s, c, velocity_command(41.0, 0.05), angle, velocity);
   EXPECT_NEAR(real(out.torque), 0.31, 1e-8);
   for (int k = 0; k < 5; ++k) out = Loops::update(s, c, velocity_command(41.0, 0.05), angle, velocity);
   const double before = real(out.torque);
-  out = Loops::update(s, c, {Mode::position, {12345 + 1'000'000}, velocity, {}}, angle, velocity);
+  out = Loops::update(s, c, {Loop::position, {12345 + 1'000'000}, velocity, {}}, angle, velocity);
   EXPECT_NEAR(real(out.torque), before, 1e-8);
   EXPECT_GT(before, 0.3);
   // Off is zero at once, and nothing is left over.
@@ -243,9 +243,9 @@ TEST(Loops, FeedforwardOfWhatTheMotorNeedsLeavesTheIntegralAlone) {
 // The equations as the header states them, written a second time, in plain double.
 class Equations {
  public:
-  double tick(Mode mode, double distance_turns, double velocity_set, double torque_set, double w) {
-    if (mode == Mode::off) {
-      before_ = Mode::off;
+  double tick(Loop loop, double distance_turns, double velocity_set, double torque_set, double w) {
+    if (loop == Loop::off) {
+      before_ = Loop::off;
       x_ = t_ = 0.0;
       return 0.0;
     }
@@ -253,25 +253,25 @@ class Equations {
     w = std::clamp(w, -2 * wo, 2 * wo);
     const double ff = std::clamp(torque_set, -2 * tl, 2 * tl), wf = std::clamp(velocity_set, -2 * wo, 2 * wo);
     double u = ff, e = 0.0;
-    if (mode != Mode::torque) {
+    if (loop != Loop::torque) {
       const double from_position = std::clamp(20.0 * kTurn / 200.0 * distance_turns, -4.0, 4.0);
-      e = std::clamp(wf + (mode == Mode::position ? from_position : 0.0), -wl, wl) - w;
+      e = std::clamp(wf + (loop == Loop::position ? from_position : 0.0), -wl, wl) - w;
       const double p = 0.02 * 200.0 / 0.5 * e;
-      if (mode != before_) x_ = std::clamp(t_ - p - ff, -tl, tl);
+      if (loop != before_) x_ = std::clamp(t_ - p - ff, -tl, tl);
       u = p + x_ + ff;
     }
-    before_ = mode;
+    before_ = loop;
     const double high = std::clamp(tl * (wo - w) / (wo - wl), -tl, tl);
     const double low = std::clamp(-tl * (wo + w) / (wo - wl), -tl, tl);
     t_ = std::clamp(u, low, high);
     const bool pushes = (u > high && e > 0.0) || (u < low && e < 0.0);
-    if (mode != Mode::torque && !pushes) x_ = std::clamp(x_ + 0.8 * kTickS * 200.0 / 0.5 * e, -tl, tl);
+    if (loop != Loop::torque && !pushes) x_ = std::clamp(x_ + 0.8 * kTickS * 200.0 / 0.5 * e, -tl, tl);
     return t_;
   }
 
  private:
   double x_ = 0.0, t_ = 0.0;
-  Mode before_ = Mode::off;
+  Loop before_ = Loop::off;
 };
 
 TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEquations) {
@@ -287,20 +287,20 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
   double worst = 0.0, worst_real = 0.0, largest = 0.0;
   int inside = 0;
   const auto signal = [&] { return static_cast<std::int32_t>(random()) >> (random() % 32); };
-  Mode mode = Mode::velocity;
+  Loop loop = Loop::velocity;
   for (int k = 0; k < 100'000; ++k) {
-    if (random() % 50 == 0) mode = static_cast<Mode>(random() % 4);
+    if (random() % 50 == 0) loop = static_cast<Loop>(random() % 4);
     const fixed::Angle set{static_cast<std::int64_t>(random()) >> (random() % 64)};
     const fixed::Angle at{static_cast<std::int64_t>(random()) >> (random() % 64)};
     const fixed::Value velocity_set{signal()}, torque_set{signal()}, velocity{signal()};
-    const auto out = Loops::update(s, c, {mode, set, {velocity_set}, {torque_set}}, at, Checked::Value{velocity});
+    const auto out = Loops::update(s, c, {loop, set, {velocity_set}, {torque_set}}, at, Checked::Value{velocity});
     const auto fixed_out =
-        Loops::update(s_fixed, c_fixed, {mode, set, {velocity_set}, {torque_set}}, at, Fixed::Value{velocity});
+        Loops::update(s_fixed, c_fixed, {loop, set, {velocity_set}, {torque_set}}, at, Fixed::Value{velocity});
     ASSERT_EQ(out.torque.raw, fixed_out.torque.raw);
     const double distance = std::ldexp(static_cast<double>((set - at).raw), -32);
     const auto real_out =
-        Loops::update(s_real, c_real, {mode, distance, real(velocity_set), real(torque_set)}, 0.0, real(velocity));
-    const double expected = equations.tick(mode, distance, real(velocity_set), real(torque_set), real(velocity));
+        Loops::update(s_real, c_real, {loop, distance, real(velocity_set), real(torque_set)}, 0.0, real(velocity));
+    const double expected = equations.tick(loop, distance, real(velocity_set), real(torque_set), real(velocity));
     worst = std::max(worst, std::abs(real(out.torque) - expected));
     worst_real = std::max(worst_real, std::abs(real_out.torque - expected));
     ASSERT_LE(std::abs(real(out.torque)), kTorqueLimit + 1e-8);
@@ -308,7 +308,7 @@ TEST(Loops, HoldAllLimitsForAHundredThousandAdversarialTicksAndAgreeWithTheirEqu
     ASSERT_LE(std::abs(std::ldexp(static_cast<double>(s.integral.raw), -60)), kTorqueLimit + 1e-8);
     EXPECT_NEAR(real(out.current), real(out.torque) * 0.5 / 0.125 / 4.0, 1e-8);
     largest = std::max(largest, std::abs(real(out.torque)));
-    if (mode != Mode::off && !out.limited) ++inside;
+    if (loop != Loop::off && !out.limited) ++inside;
   }
   EXPECT_EQ(OverflowLog::count(), 0) << OverflowLog::first();
   EXPECT_LT(worst, 3e-7);

@@ -92,7 +92,7 @@ TEST(FocCurrentLoop, NoiseOfTheReadingsShowsInTheVoltageByTheRateOverTheBandwidt
     double sum = 0.0, square = 0.0;
     const int settling = 400, all = 20000;
     for (int k = 0; k < settling; ++k) rig.step(0.0, 5.0);
-    const double volt = std::ldexp(b.sensors.bus_full_scale_v, rig.settings().current.up - 30);
+    const double volt = std::ldexp(b.sensors.bus_full_scale_v, rig.settings().current.voltage_exponent - 30);
     for (int k = 0; k < all; ++k) {
       rig.step(0.0, 5.0);
       const double u = rig.outputs().wanted.q * volt;

@@ -100,7 +100,8 @@ Weakened at_speed(double hertz, bool weakening) {
     rig.step(amperes(l.set_point.d), amperes(l.set_point.q));
     const auto& o = rig.outputs();
     if (k % 2 == 0)
-      l = foc::limit_currents(s, c, {0, q27(4.0 / 40.0)}, o.measured, o.wanted, o.most, rig.settings().current.up);
+      l = foc::limit_currents(s, c, {0, q27(4.0 / 40.0)}, o.measured, o.wanted, o.most,
+                              rig.settings().current.voltage_exponent);
     if (k < kTicks - kMean) continue;
     w.torque += rig.sample().torque_nm / kMean;
     w.d += rig.sample().current.d / kMean;

@@ -57,7 +57,7 @@ TEST(FocTransforms, ARotationByAStepIsThatOfTheSum) {
   double worst = 0.0, worst_half = 0.0;
   for (int k = 0; k < 100'000; ++k) {
     const auto angle = static_cast<std::uint32_t>(random());
-    const std::int32_t step = held<28>(static_cast<std::int32_t>(random() >> 35) - (1 << 28));
+    const std::int32_t step = saturated_signed<28>(static_cast<std::int32_t>(random() >> 35) - (1 << 28));
     const Rotation by_step = rotated(rotation(angle), step), exact = rotation(angle + static_cast<std::uint32_t>(step));
     const double off = std::max(std::abs(by_step.cosine - exact.cosine), std::abs(by_step.sine - exact.sine)) * 0x1p-30;
     worst = std::max(worst, off);

@@ -41,8 +41,8 @@ TEST(ThreePhaseDrive, ItsSettingsAreThoseThatTheHostMakes) {
     expect_near(has.current.q.per_slope, made.current.q.per_slope);
     expect_near(has.current.q.reactance, made.current.q.reactance);
     expect_near(has.current.flux, made.current.flux);
-    expect_near(has.current.pull, made.current.pull);
-    EXPECT_EQ(has.current.up, made.current.up);
+    expect_near(has.current.response_per_period, made.current.response_per_period);
+    EXPECT_EQ(has.current.voltage_exponent, made.current.voltage_exponent);
     expect_near(has.modulation.window, made.modulation.window);
     expect_near(has.modulation.dead_time, made.modulation.dead_time);
     expect_near(has.modulation.dead_time_gain, made.modulation.dead_time_gain);

@@ -128,7 +128,8 @@ Failure failure_of(drive::Session& session, const protocol::CommissioningProgres
 }
 
 json current_loop_json(const DriveFacts& b, const control::MotorSettings& m) {
-  const double ohm = b.setup.bus_full_scale_v / b.setup.current_full_scale_a * std::ldexp(1.0, m.current.up - 5);
+  const double ohm =
+      b.setup.bus_full_scale_v / b.setup.current_full_scale_a * std::ldexp(1.0, m.current.voltage_exponent - 5);
   const auto gain = [&](std::int32_t x) { return std::ldexp(static_cast<double>(x), -30) * ohm; };
   return {{"bandwidth_hz", b.bandwidth_hz},
           {"proportional_d_v_a", gain(m.current.d.proportional)},

@@ -42,12 +42,12 @@ AxisSettings settings_of(const Axis& a, double base_ohm) {
   c.proportional = quantised(a.proportional / base_ohm, 30, "the proportional gain");
   c.integral = quantised(a.integral / base_ohm, 30, "the integral gain");
   c.resistance = quantised(a.resistance / base_ohm, 30, "the resistance");
-  c.slope = quantised(a.slope / base_ohm, 30, "the inductance over a period");
-  c.per_slope = quantised(base_ohm / a.slope, 27, "a period over the inductance: d and q differ too much, it");
-  c.beyond = quantised(a.middle - 1.0, 32, "the weight of the middle of a period");
-  c.weight = quantised(a.weight - 1.0, 32,
-                       "the resistance over the inductance, for this PWM rate, the decay of half a period");
-  c.pending = quantised(a.pending, 31, "the part of a correction that is still to act");
+  c.volts_per_change = quantised(a.slope / base_ohm, 30, "the inductance over a period");
+  c.change_per_volt = quantised(base_ohm / a.slope, 27, "a period over the inductance: d and q differ too much, it");
+  c.half_period_gain_less_one = quantised(a.middle - 1.0, 32, "the weight of the middle of a period");
+  c.sample_weight_less_one = quantised(
+      a.weight - 1.0, 32, "the resistance over the inductance, for this PWM rate, the decay of half a period");
+  c.pending_gain = quantised(a.pending, 31, "the part of a correction that is still to act");
   c.reactance = quantised(a.reactance / base_ohm, 30, "the reactance");
   return c;
 }
@@ -94,9 +94,10 @@ control::foc::Settings foc_settings(const FocSetup& given) {
   const double flux = 2.0 * std::numbers::pi * s.flux_vs * s.pwm_hz / 8.0 / base_v;
   require(flux < 31.0, "the flux is too large for the bus voltage's full scale");
   c.current.flux = quantised(flux, 25, "the flux");
-  c.current.pull = quantised(-std::expm1(-2.0 * std::numbers::pi * s.bandwidth_hz / s.pwm_hz), 32, "the bandwidth");
+  c.current.response_per_period =
+      quantised(-std::expm1(-2.0 * std::numbers::pi * s.bandwidth_hz / s.pwm_hz), 32, "the bandwidth");
   c.current.integral_limit = quantised(std::ldexp(1.0, -power), 25, "the limit of the integral");
-  c.current.up = power + 5;
+  c.current.voltage_exponent = power + 5;
 
   auto& m = c.modulation;
   constexpr int kBits = control::foc::kDutyBits;

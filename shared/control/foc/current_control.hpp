@@ -31,23 +31,23 @@ namespace flexspline::control::foc {
 // the bus voltage times a power of two that leaves each coefficient below two: so products add up in 64 bits, and
 // nothing has to be shifted or limited on the way.
 struct AxisSettings {
-  std::int32_t proportional = 0;  // Kp, 2^-30
-  std::int32_t integral = 0;      // Ki, 2^-30
-  std::int32_t resistance = 0;    // R, 2^-30
-  std::int32_t slope = 0;         // S, 2^-30
-  std::int32_t per_slope = 0;     // 1/S, 2^-27
-  std::int32_t beyond = 0;        // h - 1, 2^-32
-  std::int32_t weight = 0;        // sqrt(a) + B - 1, 2^-32
-  std::int32_t pending = 0;       // B sqrt(a) + (1 - B) h Kp/S, 2^-31
-  std::int32_t reactance = 0;     // 2 pi L/(8 T), 2^-30: the speed is counted in eighths of a turn per period
+  std::int32_t proportional = 0;               // Kp, 2^-30
+  std::int32_t integral = 0;                   // Ki, 2^-30
+  std::int32_t resistance = 0;                 // R, 2^-30
+  std::int32_t volts_per_change = 0;           // S, 2^-30
+  std::int32_t change_per_volt = 0;            // 1/S, 2^-27
+  std::int32_t half_period_gain_less_one = 0;  // h - 1, 2^-32
+  std::int32_t sample_weight_less_one = 0;     // sqrt(a) + B - 1, 2^-32
+  std::int32_t pending_gain = 0;               // B sqrt(a) + (1 - B) h Kp/S, 2^-31
+  std::int32_t reactance = 0;  // 2 pi L/(8 T), 2^-30: the speed is counted in eighths of a turn per period
 };
 struct CurrentSettings {
   AxisSettings d;
   AxisSettings q;
-  std::int32_t flux = 0;            // 2 pi flux/(8 T), 2^-25
-  std::int32_t pull = 0;            // 1 - exp(-w T), 2^-32
-  std::int32_t integral_limit = 0;  // 2^-25
-  std::int32_t up = 0;              // voltages times 2^up are in 2^-30 of the bus voltage's full scale; 5 to 25
+  std::int32_t flux = 0;                 // 2 pi flux/(8 T), 2^-25
+  std::int32_t response_per_period = 0;  // 1 - exp(-w T), 2^-32
+  std::int32_t integral_limit = 0;       // 2^-25
+  std::int32_t voltage_exponent = 0;     // voltages times 2^this are in 2^-30 of the bus voltage's full scale; 5 to 25
 };
 struct AxisState {
   std::int64_t integral = 0;  // 2^-57
@@ -71,32 +71,35 @@ inline constexpr int kStepBits = 28;     // electrical turns per period: one six
 namespace detail {
 struct AxisPlan {
   std::int32_t error = 0;
-  std::int32_t move = 0;      // D
+  std::int32_t change = 0;    // D
   std::int32_t expected = 0;  // n
   std::int32_t pending = 0;   // half of it
   std::int32_t voltage = 0;   // without cross
 };
-constexpr AxisPlan plan(const AxisSettings& c, const AxisState& s, std::int32_t pull, std::int32_t set_point,
-                        std::int32_t measured) {
+constexpr AxisPlan plan(const AxisSettings& c, const AxisState& s, std::int32_t response_per_period,
+                        std::int32_t set_point, std::int32_t measured) {
   AxisPlan p;
   const std::int32_t seen = s.expected - measured;  // within four bases
-  // Held, as readings that mean nothing can drive it up: within four bases, with a pending part below one of itself.
-  p.error = held<kCurrentBits + 1>(fixed::add_high(seen, seen, c.weight) - s.pending * 2);
-  p.pending = fixed::multiply_high(p.error, c.pending);
-  p.move = fixed::multiply_high(set_point - s.model, pull);
-  p.expected = held<kCurrentBits>(fixed::add_high(s.model + p.move, p.move, c.beyond) - p.error + p.pending * 2);
+  // Saturated, as readings that mean nothing can drive it up: within four bases, with a pending part below one of
+  // itself.
+  p.error = saturated_signed<kCurrentBits + 1>(fixed::add_high(seen, seen, c.sample_weight_less_one) - s.pending * 2);
+  p.pending = fixed::multiply_high(p.error, c.pending_gain);
+  p.change = fixed::multiply_high(set_point - s.model, response_per_period);
+  p.expected = saturated_signed<kCurrentBits>(
+      fixed::add_high(s.model + p.change, p.change, c.half_period_gain_less_one) - p.error + p.pending * 2);
   // Each product is below 2^60, and so is the integral.
-  const std::int64_t sum = s.integral + std::int64_t{c.proportional} * p.error + std::int64_t{c.slope} * p.move +
-                           std::int64_t{c.resistance} * s.model;
+  const std::int64_t sum = s.integral + std::int64_t{c.proportional} * p.error +
+                           std::int64_t{c.volts_per_change} * p.change + std::int64_t{c.resistance} * s.model;
   p.voltage = static_cast<std::int32_t>(sum >> 32);
   return p;
 }
 // `excess`: limited less wanted voltage.
 constexpr void advance(AxisState& s, const AxisSettings& c, const AxisPlan& p, std::int32_t excess,
                        std::int32_t integral_limit) {
-  const std::int32_t back = held<22>(fixed::multiply_high(excess, c.per_slope));  // four bases in 2^-20
-  const std::int32_t next = held<kCurrentBits>(s.model + p.move + back * 128);
-  s.expected = fixed::add_high(next, next - s.model, c.beyond);
+  const std::int32_t back =
+      saturated_signed<22>(fixed::multiply_high(excess, c.change_per_volt));  // four bases in 2^-20
+  const std::int32_t next = saturated_signed<kCurrentBits>(s.model + p.change + back * 128);
+  s.expected = fixed::add_high(next, next - s.model, c.half_period_gain_less_one);
   s.model = next;
   s.pending = p.pending;
   // Opposite signs: the limit holds back what the error asks for.
@@ -115,8 +118,8 @@ constexpr void advance(AxisState& s, const AxisSettings& c, const AxisPlan& p, s
 constexpr Voltages control_currents(CurrentState& s, const CurrentSettings& c, const RotorVector& set_point,
                                     const RotorVector& measured, std::int32_t step, std::int32_t most) {
   using fixed::multiply_high;
-  const detail::AxisPlan d = detail::plan(c.d, s.d, c.pull, set_point.d, measured.d);
-  const detail::AxisPlan q = detail::plan(c.q, s.q, c.pull, set_point.q, measured.q);
+  const detail::AxisPlan d = detail::plan(c.d, s.d, c.response_per_period, set_point.d, measured.d);
+  const detail::AxisPlan q = detail::plan(c.q, s.q, c.response_per_period, set_point.q, measured.q);
   const std::int32_t eighths = step * 8;
   const std::int32_t linkage_d = fixed::add_high(c.flux, c.d.reactance, d.expected);
   const std::int32_t linkage_q = multiply_high(c.q.reactance, q.expected);
@@ -125,13 +128,13 @@ constexpr Voltages control_currents(CurrentState& s, const CurrentSettings& c, c
   u.expected = {d.expected, q.expected};
 
   const std::int32_t limited_d = fixed::limited(u.wanted.d, -most, most);
-  const std::int32_t whole = most << c.up;
-  u.limited.d = limited_d << c.up;
+  const std::int32_t whole = most << c.voltage_exponent;
+  u.limited.d = limited_d << c.voltage_exponent;
   // 2^-28, of which the root is taken in 2^-32.
   const auto square = static_cast<std::uint32_t>(multiply_high(whole, whole) - multiply_high(u.limited.d, u.limited.d));
-  const auto most_q = static_cast<std::int32_t>(root_word(square << 4) >> (c.up + 1));
+  const auto most_q = static_cast<std::int32_t>(root_word(square << 4) >> (c.voltage_exponent + 1));
   const std::int32_t limited_q = fixed::limited(u.wanted.q, -most_q, most_q);
-  u.limited.q = limited_q << c.up;
+  u.limited.q = limited_q << c.voltage_exponent;
   detail::advance(s.d, c.d, d, limited_d - u.wanted.d, c.integral_limit);
   detail::advance(s.q, c.q, q, limited_q - u.wanted.q, c.integral_limit);
   return u;

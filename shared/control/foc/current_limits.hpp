@@ -2,7 +2,7 @@
 // the circle of the current.
 //   f     <- clamp(f + G (share U - |u|), -weakening, 0)     |u|: wanted voltage, U: the circle of the voltage
 //   heat  <- heat + (i^2 - heat) T/tau                        I2t: temperature of the winding in units of a current^2
-//   I^2   = peak^2 up to heat = start, then down a straight line to continuous^2 at heat = continuous^2
+//   I^2   = peak^2 up to heat = start, then linearly down to continuous^2 at heat = continuous^2
 //   d     = clamp(d_wanted + f, I), q = clamp(q_wanted, sqrt(I^2 - d^2))
 // At a constant current set point heat ends where I^2 = heat: at the continuous current and never above it.
 #pragma once
@@ -80,7 +80,7 @@ constexpr Limits limit_currents(LimitState& s, const LimitSettings& c, const Rot
   Limits l;
   l.current = heat_limit(c, s);
   l.by_heat = static_cast<std::uint32_t>(s.heat >> 32) > c.start_square;
-  l.set_point.d = fixed::limited(held<kCurrentBits>(set_point.d) + s.weakening, -l.current, l.current);
+  l.set_point.d = fixed::limited(saturated_signed<kCurrentBits>(set_point.d) + s.weakening, -l.current, l.current);
   const std::uint32_t all = detail::square_of(l.current), of_d = detail::square_of(l.set_point.d);
   const std::int32_t most_q = detail::current_of(all > of_d ? all - of_d : 0);
   l.set_point.q = fixed::limited(set_point.q, -most_q, most_q);

@@ -50,11 +50,12 @@ constexpr void update(State& s, const Settings& c, const Inputs& in, Outputs& ou
   // One by one: compilers build a struct on the stack first.
   out.measured.d = quarter.d * 4;
   out.measured.q = quarter.q * 4;
-  const std::int32_t step = held<kStepBits>(in.step);
+  const std::int32_t step = saturated_signed<kStepBits>(in.step);
   const std::int32_t bus = in.bus < kLeastBus ? kLeastBus : in.bus;
   const std::int32_t most = fixed::multiply_high(bus << 16, c.circle);
   out.most = most;
-  const RotorVector set_point = {held<kCurrentBits>(in.set_point.d), held<kCurrentBits>(in.set_point.q)};
+  const RotorVector set_point = {saturated_signed<kCurrentBits>(in.set_point.d),
+                                 saturated_signed<kCurrentBits>(in.set_point.q)};
   const Voltages u = control_currents(s.current, c.current, set_point, {quarter.d * 4, quarter.q * 4}, step, most);
   out.wanted.d = u.wanted.d;
   out.wanted.q = u.wanted.q;

@@ -44,7 +44,7 @@ constexpr std::int32_t per_bus(std::int32_t bus) {
 
 namespace detail {
 constexpr std::int32_t count_of(const ModulationSettings& c, std::int32_t duty, std::int32_t current) {
-  const std::int32_t share = held<kZoneBits>(fixed::multiply_high(current, c.dead_time_gain));
+  const std::int32_t share = saturated_signed<kZoneBits>(fixed::multiply_high(current, c.dead_time_gain));
   const std::int32_t all = duty > 0 ? duty + share * c.dead_time : 0;
   return fixed::multiply_high(static_cast<std::int32_t>(fixed::saturated<kDutyBits>(all)), c.period);
 }

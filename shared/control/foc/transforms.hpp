@@ -71,7 +71,7 @@ constexpr Rotation rotated(const Rotation& r, std::int32_t step) {
 }
 // x within -2^Bits and 2^Bits - 1: SSAT, which compilers do not find in a comparison.
 template <int Bits>
-constexpr std::int32_t held(std::int32_t x) {
+constexpr std::int32_t saturated_signed(std::int32_t x) {
 #if defined(__arm__) && defined(__thumb2__)
   if (!std::is_constant_evaluated()) {
     std::int32_t y;

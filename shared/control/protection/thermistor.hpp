@@ -1,5 +1,5 @@
 // Temperature of a power stage by a thermistor (NTC) in a divider: a table over the converter's reading, which the host
-// makes from the beta equation 1/T = 1/T25 + ln(R/R25)/beta, and straight lines between its points. A reading beyond
+// makes from the beta equation 1/T = 1/T25 + ln(R/R25)/beta, piecewise linear between its points. A reading beyond
 // either end of the range is a wire that is open, or shorted.
 #pragma once
 

@@ -49,10 +49,11 @@ class WindingWatch {
                                 const foc::Inputs& in, const foc::Outputs& out, const foc::Phases& phases) {
     if (++period_ < s.every) return WindingFault::none;
     period_ = 0;
-    const std::int32_t emf = size(fixed::multiply_high(c.current.flux, foc::held<foc::kStepBits>(in.step) * 8));
+    const std::int32_t emf =
+        size(fixed::multiply_high(c.current.flux, foc::saturated_signed<foc::kStepBits>(in.step) * 8));
     if (is_lost(s, in, phases, emf < out.most / 2)) return WindingFault::phase_lost;
-    const std::int32_t most =
-        fixed::multiply_high(c.current.d.resistance, s.resistance_error) + (s.lost_voltage >> c.current.up) + emf / 4;
+    const std::int32_t most = fixed::multiply_high(c.current.d.resistance, s.resistance_error) +
+                              (s.lost_voltage >> c.current.voltage_exponent) + emf / 4;
     const bool unexplained = size(integral(state.current.d)) > most || size(integral(state.current.q)) > most;
     residual_samples_ = unexplained ? residual_samples_ + 1 : 0;
     return residual_samples_ >= kResidualSamples ? WindingFault::residual : WindingFault::none;
@@ -72,8 +73,8 @@ class WindingWatch {
   }
   constexpr bool is_lost(const WindingSettings& s, const foc::Inputs& in, const foc::Phases& phases, bool has_voltage) {
     const foc::Rotation at = foc::rotation(in.angle);
-    const foc::RotorVector set = {foc::held<foc::kCurrentBits>(in.set_point.d),
-                                  foc::held<foc::kCurrentBits>(in.set_point.q)};
+    const foc::RotorVector set = {foc::saturated_signed<foc::kCurrentBits>(in.set_point.d),
+                                  foc::saturated_signed<foc::kCurrentBits>(in.set_point.q)};
     const foc::Phases quarter = foc::inverse_clarke(foc::inverse_park_quarter(set, at));
     const std::array<std::int32_t, 3> wanted = {quarter.a * 4, quarter.b * 4, quarter.c * 4};
     const std::array<std::int32_t, 3> measured = {phases.a, phases.b, phases.c};

@@ -1,5 +1,5 @@
 // The main loop over the links of a drive.
-#include "firmware/drive.hpp"
+#include "firmware/main_loop.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "firmware/service.hpp"
 
-namespace flexspline::tests::firmware_drive_test {
+namespace flexspline::tests::firmware_main_loop_test {
 namespace {
 
 // Writes down what is polled.
@@ -25,7 +25,7 @@ struct Polled {
 struct Loop {
   std::string order;
   Polled application{order, 'a'}, service{order, 's'}, usb{order, 'u'}, can{order, 'c'}, line{order, 'l'};
-  firmware::Drive<Polled, Polled, Polled, Polled, Polled> drive{application, service, usb, can, line};
+  firmware::MainLoop<Polled, Polled, Polled, Polled, Polled> drive{application, service, usb, can, line};
   std::string one_pass() {
     order.clear();
     drive.poll();
@@ -33,11 +33,11 @@ struct Loop {
   }
 };
 
-TEST(DriveLoop, PollsEachLinkInTheOrderOfTheListAndThenTheBackgroundWork) {
+TEST(MainLoop, PollsEachLinkInTheOrderOfTheListAndThenTheBackgroundWork) {
   EXPECT_EQ(Loop().one_pass(), "uclas");
 }
 
-TEST(DriveLoop, PassesOverTheLinksAfterOneThatHasAHost) {
+TEST(MainLoop, PassesOverTheLinksAfterOneThatHasAHost) {
   Loop loop;
   loop.can.has_host = true;
   EXPECT_EQ(loop.one_pass(), "ucas");
@@ -55,4 +55,4 @@ TEST(DriveInfo, NamesAreCutToWhatTheMessageHoldsAndEndWithAZero) {
 }
 
 }  // namespace
-}  // namespace flexspline::tests::firmware_drive_test
+}  // namespace flexspline::tests::firmware_main_loop_test

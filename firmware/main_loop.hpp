@@ -14,9 +14,9 @@ concept Link = requires(T& link) {
 };
 
 template <class Application, class Service, Link... Links>
-class Drive {
+class MainLoop {
  public:
-  Drive(Application& application, Service& service, Links&... links)
+  MainLoop(Application& application, Service& service, Links&... links)
       : application_(application), service_(service), links_(links...) {}
 
   // One pass, from main() alone. Links are asked in the order of the list; those after one that has a host are passed
