@@ -71,14 +71,14 @@ inline std::uint64_t hash_of_torsion(const Settings& s, int ticks) {
 }
 
 inline std::uint64_t hash_of_loops(const Settings& s, int ticks) {
-  using control::Mode;
+  using control::Loop;
   control::Loops::State<Fixed> state;
-  constexpr Mode kModes[] = {Mode::off, Mode::torque, Mode::velocity, Mode::position};
+  constexpr Loop kLoops[] = {Loop::off, Loop::torque, Loop::velocity, Loop::position};
   return hash_over(ticks, [&](int k, Random& random, Hash& hash) {
     // A mode for a while, seldom off.
     const std::uint32_t period = static_cast<std::uint32_t>(k) / 13;
-    const Mode mode = kModes[period % 19 == 0 ? 0 : 1 + period % 3];
-    const control::Loops::Command<Fixed> command{mode, angle(random), value(random), value(random)};
+    const Loop loop = kLoops[period % 19 == 0 ? 0 : 1 + period % 3];
+    const control::Loops::Command<Fixed> command{loop, angle(random), value(random), value(random)};
     const auto measured = angle(random);
     const auto out = control::Loops::update<Fixed>(state, s.loops, command, measured, value(random));
     take_all(hash, out.torque, out.current, std::int64_t{out.limited}, state.integral);
