@@ -38,7 +38,7 @@ TEST(ThreePhaseDrive, ItsSettingsAreThoseThatTheHostMakes) {
     expect_near(has.current.q.integral, made.current.q.integral);
     expect_near(has.current.d.resistance, made.current.d.resistance);
     expect_near(has.current.d.slope, made.current.d.slope);
-    expect_near(has.current.q.per_slope, made.current.q.per_slope);
+    expect_near(has.current.q.change_per_volt, made.current.q.change_per_volt);
     expect_near(has.current.q.reactance, made.current.q.reactance);
     expect_near(has.current.flux, made.current.flux);
     expect_near(has.current.response_per_period, made.current.response_per_period);
