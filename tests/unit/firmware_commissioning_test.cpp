@@ -380,7 +380,7 @@ TEST(FirmwareCommissioning, ABlockWithAMotorOutsideItsBoundsIsRefused) {
   EXPECT_EQ(fault_of([](auto& m) { m.pole_pairs = 41; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(fault_of([](auto& m) { m.gain.b = 9000; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(fault_of([](auto& m) { m.current.voltage_exponent = 4; }), BlockFault::unlike_coefficients);
-  EXPECT_EQ(fault_of([](auto& m) { m.current.d.beyond = 1; }), BlockFault::unlike_coefficients);
+  EXPECT_EQ(fault_of([](auto& m) { m.current.d.half_period_gain_less_one = 1; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(fault_of([](auto& m) { m.encoder_counts += 1; }), BlockFault::unlike_coefficients);
   EXPECT_EQ(control::motor_of(drive::with_motor(made, motor)).current.d.proportional, stage.foc.current.d.proportional);
   EXPECT_EQ(control::motor_of(made).pole_pairs, 0U);

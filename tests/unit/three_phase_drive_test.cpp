@@ -37,7 +37,7 @@ TEST(ThreePhaseDrive, ItsSettingsAreThoseThatTheHostMakes) {
     expect_near(has.current.d.proportional, made.current.d.proportional);
     expect_near(has.current.q.integral, made.current.q.integral);
     expect_near(has.current.d.resistance, made.current.d.resistance);
-    expect_near(has.current.d.slope, made.current.d.slope);
+    expect_near(has.current.d.volts_per_change, made.current.d.volts_per_change);
     expect_near(has.current.q.change_per_volt, made.current.q.change_per_volt);
     expect_near(has.current.q.reactance, made.current.q.reactance);
     expect_near(has.current.flux, made.current.flux);
