@@ -176,7 +176,7 @@ Drive drive;
   in.torsion_direction.raw = measured.torsion_direction.raw;
   in.torque.raw = measured.torque.raw;
   Loops::Command<Fixed> command;
-  command.mode = set.mode;
+  command.loop = set.loop;
   command.position = set.position;
   command.velocity.raw = set.velocity.raw;
   command.torque = Fixed::narrow(d.model.tick(in).motor);
