@@ -81,6 +81,16 @@ TEST(RobotNames, BarrettsSymbolsOfAJoint) {
   EXPECT_TRUE(contains(said, "motor_torque_nm: \"jt2\"")) << said;
 }
 
+TEST(RobotNames, AStatedColumnIsOfTheJointThatTheOthersAreTakenOf) {
+  const Shell shell;
+  const std::string log = log_of("time,jp1,jp2,jv1,jv2,jt1,jt2",
+                                 {time_in(1.0), constant(0.0), angle, constant(0.0), speed, constant(0.0), torque});
+  const std::string said = taken(shell, log, "--map motor_position_rad=jp2");
+  EXPECT_TRUE(contains(said, "motor_velocity_rad_s: \"jv2\"")) << said;
+  EXPECT_FALSE(contains(said, ": \"jp1\"")) << said;
+  EXPECT_FALSE(contains(said, ": \"jt1\"")) << said;
+}
+
 TEST(RobotNames, ATextIsNotSuggestedForASignalThatIsMissing) {
   const Shell shell;
   std::string log = "time,position,currant,kappa\n";

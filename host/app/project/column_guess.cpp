@@ -143,8 +143,14 @@ class Guesser {
     if (joints.size() < 2 && !options_.joint) return;
     result_.joints.assign(joints.begin(), joints.end());
     if (joints.empty()) return;
-    joint_ = options_.joint ? *options_.joint : *joints.begin();
+    joint_ = options_.joint ? *options_.joint : joint_of_stated(joints).value_or(*joints.begin());
     result_.joint = joint_;
+  }
+  // The joint of a column that is stated: those of another one do not belong to it.
+  std::optional<int> joint_of_stated(const std::set<int>& joints) {
+    for (const ColumnGuess& column : result_.columns)
+      if (const auto joint = readings_[column.theirs].joint; joint && joints.contains(*joint)) return joint;
+    return std::nullopt;
   }
 
   void take(const std::string& name, bool by_unit_only, bool current) {

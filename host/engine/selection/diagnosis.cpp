@@ -259,9 +259,9 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     check_unknown_structure(judged.search, likeliest, result);
   }
   if (tests_between_records) look_between_records(*base, of_all_records, decision, result);
-  const bool is_of_motor = decision.motor && result.balance == estimation::Balance::motor;
-  name_on_other_balances(all, is_of_motor ? *decision.motor : judged, model.drive, result);
-  if (decision.motor) refit_presliding(dataset, model, options, *decision.motor, result);
+  name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *decision.motor : judged, model.drive,
+                         result);
+  refit_presliding(dataset, model, options, decision.motor, result);
   take_back_insignificant(result);
   explain_orders(base->model.drive, result);
   assess_excitation(decision.moves, result);

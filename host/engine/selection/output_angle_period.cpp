@@ -63,6 +63,13 @@ double evidence_of_period(const BalanceSearch& search, const CandidateFit& candi
   return samples / candidate.fit.autocorrelation_time * std::log(std::max(of_half, 1e-300) / std::max(of_turn, 1e-300));
 }
 
+// Of a drive without a gear a wave of the motor's turn is the same function.
+bool is_identical(const CandidateFit& a, const CandidateFit& b) {
+  constexpr double kRounding = 1e-6;  // relative
+  const auto are_same = [](double x, double y) { return std::abs(x - y) <= kRounding * std::abs(x); };
+  return are_same(a.gain.score, b.gain.score) && are_same(a.gain.chi2_percent, b.gain.chi2_percent);
+}
+
 }  // namespace
 
 void check_output_angle_period(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
@@ -70,14 +77,18 @@ void check_output_angle_period(const BalanceSearch& search, std::vector<Candidat
   for (CandidateFit& candidate : candidates) {
     if (!is_of_one_turn(*candidate.model.entry) || !candidate.admissible) continue;
     const double evidence = evidence_of_period(search, candidate);
-    candidate.has_uncertain_period = evidence < kPolicy.positive_evidence;
-    if (!candidate.has_uncertain_period) continue;
+    if (evidence >= kPolicy.positive_evidence) continue;
     any = true;
-    candidate.admissible = false;
-    candidate.why_not = fmt::format(
+    const std::string why_not = fmt::format(
         "a function of the output's angle with half its period explains {} (by a score of {:.0f}): move over a larger "
         "part of a turn",
         evidence > 0.0 ? "hardly less" : "no less", std::abs(evidence));
+    for (CandidateFit& same : candidates) {
+      if (&same != &candidate && !is_identical(candidate, same)) continue;
+      same.has_uncertain_period = true;
+      same.admissible = false;
+      same.why_not = why_not;
+    }
   }
   if (any) sort_candidates(search, candidates);
 }

@@ -27,9 +27,9 @@ Terms with_others(Terms terms, const SearchedBalance& motor, const std::vector<N
 }  // namespace
 
 void refit_presliding(const data::Dataset& dataset, const model::Model& model, const Options& options,
-                      const SearchedBalance& motor, Diagnosis& result) {
+                      const SearchedBalance* motor, Diagnosis& result) {
   const auto name = std::ranges::find_if(result.named, is_presliding);
-  if (name == result.named.end() || motor.search.data->prepared().pipeline.keep_motor_reversals ||
+  if (name == result.named.end() || !motor || motor->search.data->prepared().pipeline.keep_motor_reversals ||
       !options.pipeline.mask)
     return;
   const auto listed = std::ranges::find_if(result.candidates, [&](const Candidate& c) { return name_of(c) == *name; });
@@ -40,8 +40,8 @@ void refit_presliding(const data::Dataset& dataset, const model::Model& model, c
   const auto fitted = estimation::identify(dataset, model, with_reversals);
   const auto data = std::ranges::find(fitted->data, estimation::Balance::motor, &RegressionProblem::balance);
   if (data == fitted->data.end()) return;
-  BalanceSearch search{&*data, Eigen::VectorXd::Ones(data->rows()), {}, motor.search.floor};
-  search.base = cross_validate(*data, with_others(fitted->terms, motor, result.named), search.keep);
+  BalanceSearch search{&*data, Eigen::VectorXd::Ones(data->rows()), {}, motor->search.floor};
+  search.base = cross_validate(*data, with_others(fitted->terms, *motor, result.named), search.keep);
   const std::vector<CandidateFit> laws = rank_candidates(search, [&](const CandidateModel& law) {
     return NamedEffect{std::string(law.entry->name()), law.order} == *name;
   });
