@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <random>
+#include <stdexcept>
+#include <vector>
 
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/selection/output_angle_period.hpp"
@@ -16,9 +18,9 @@ namespace {
 
 using data::Column;
 
-// The candidate `gravity` of an axis that moves `stroke_rad` to either side, and on which 0.05 N m sin(waves * angle)
-// acts.
-CandidateFit weight(double stroke_rad, double waves) {
+// The candidates `gravity` and `torque_ripple` of order 1 of an axis without a gear that moves `stroke_rad` to either
+// side, and on which 0.05 N m sin(waves * angle) acts.
+std::vector<CandidateFit> weight_and_ripple(double stroke_rad, double waves) {
   data::Dataset dataset;
   std::mt19937_64 random(7);
   std::normal_distribution<double> noise(0.0, 1.0);
@@ -37,10 +39,17 @@ CandidateFit weight(double stroke_rad, double waves) {
   const RegressionProblem& data = identified->data.front();
   BalanceSearch search{&data, Eigen::VectorXd::Ones(data.rows()), {}};
   search.base = cross_validate(data, identified->terms, search.keep);
-  std::vector<CandidateFit> candidates =
-      rank_candidates(search, [](const CandidateModel& m) { return m.entry->name() == "gravity"; });
+  std::vector<CandidateFit> candidates = rank_candidates(search, [](const CandidateModel& m) {
+    return m.entry->name() == "gravity" || (m.entry->name() == "torque_ripple" && m.order == 1.0);
+  });
   check_output_angle_period(search, candidates);
-  return candidates.at(0);
+  return candidates;
+}
+
+CandidateFit weight(double stroke_rad, double waves) {
+  for (CandidateFit& candidate : weight_and_ripple(stroke_rad, waves))
+    if (candidate.model.entry->name() == "gravity") return std::move(candidate);
+  throw std::logic_error("no weight is tried");
 }
 
 TEST(OutputAnglePeriod, IsCertainWhereAWeightTurnsOverALargePartOfATurn) {
@@ -61,6 +70,16 @@ TEST(OutputAnglePeriod, IsUncertainOfAWeightThatHardlyTurns) {
   const CandidateFit candidate = weight(0.1, 1.0);
   EXPECT_TRUE(candidate.has_uncertain_period);
   EXPECT_NE(candidate.why_not.find("move over a larger part of a turn"), std::string::npos) << candidate.why_not;
+}
+
+// Else a ripple would be named in the place of the weight.
+TEST(OutputAnglePeriod, IsUncertainOfARippleThatIsTheSameFunctionWithoutAGear) {
+  const std::vector<CandidateFit> candidates = weight_and_ripple(0.25, 2.0);
+  ASSERT_EQ(candidates.size(), 2U);
+  for (const CandidateFit& candidate : candidates) {
+    EXPECT_TRUE(candidate.has_uncertain_period) << candidate.model.entry->name();
+    EXPECT_FALSE(candidate.admissible);
+  }
 }
 
 }  // namespace

@@ -222,6 +222,13 @@ double explained_percent(const CandidateFit& t) {
 
 }  // namespace
 
+bool is_same_function(const CandidateFit& a, const CandidateFit& b) {
+  constexpr double kRounding = 1e-6;  // relative
+  const auto are_equal = [](double x, double y) { return std::abs(x - y) <= kRounding * std::abs(x); };
+  return a.gain.chi2_percent != 0.0 && are_equal(a.gain.score, b.gain.score) &&
+         are_equal(a.gain.chi2_percent, b.gain.chi2_percent);
+}
+
 bool passes(const CandidateFit& t) {
   return t.admissible && t.score() > kPolicy.named_score && explained_percent(t) > kPolicy.named_chi2_percent;
 }

@@ -35,6 +35,10 @@ struct CandidateFit {
   double score() const { return gain.score + other_balance_score; }
 };
 
+// Whether two candidates are the same function of the data, by their gains: of a drive without a gear a wave of the
+// motor's turn is one of the output's. Nothing that gains nothing is.
+bool is_same_function(const CandidateFit& a, const CandidateFit& b);
+
 // Whether an effect may be named: admissible, certain, and large enough to matter.
 bool passes(const CandidateFit& candidate);
 // Whether it also takes the share off the left-out squares above the noise that a term has to; off all of them where

@@ -28,17 +28,13 @@ void take_likelier_waves(Resampling& resampling, const SearchedBalance& motor) {
 }
 
 void add_identical_effects(Resampling& resampling, const SearchedBalance& motor) {
-  constexpr double kRounding = 1e-6;  // relative
-  const auto are_same = [](double a, double b) { return std::abs(a - b) <= kRounding * std::abs(a); };
   for (Resampling::FoundTerm& found : resampling.found) {
     // Likelihood leaves out reversals, where alone presliding shows.
     if (found.group.size() != 1 || catalogue::get(found.group.front().effect).is_presliding()) continue;
     const CandidateFit* own = candidate_named(motor, found.group.front());
-    if (!own || own->gain.chi2_percent == 0.0) continue;
+    if (!own) continue;
     for (const CandidateFit& t : motor.candidates)
-      if (&t != own && t.admissible && are_same(own->gain.score, t.gain.score) &&
-          are_same(own->gain.chi2_percent, t.gain.chi2_percent))
-        found.group.push_back(name_of(t));
+      if (&t != own && t.admissible && is_same_function(*own, t)) found.group.push_back(name_of(t));
   }
 }
 

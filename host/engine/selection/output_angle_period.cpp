@@ -63,13 +63,6 @@ double evidence_of_period(const BalanceSearch& search, const CandidateFit& candi
   return samples / candidate.fit.autocorrelation_time * std::log(std::max(of_half, 1e-300) / std::max(of_turn, 1e-300));
 }
 
-// Of a drive without a gear a wave of the motor's turn is the same function.
-bool is_identical(const CandidateFit& a, const CandidateFit& b) {
-  constexpr double kRounding = 1e-6;  // relative
-  const auto are_same = [](double x, double y) { return std::abs(x - y) <= kRounding * std::abs(x); };
-  return are_same(a.gain.score, b.gain.score) && are_same(a.gain.chi2_percent, b.gain.chi2_percent);
-}
-
 }  // namespace
 
 void check_output_angle_period(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
@@ -84,7 +77,7 @@ void check_output_angle_period(const BalanceSearch& search, std::vector<Candidat
         "part of a turn",
         evidence > 0.0 ? "hardly less" : "no less", std::abs(evidence));
     for (CandidateFit& same : candidates) {
-      if (&same != &candidate && !is_identical(candidate, same)) continue;
+      if (&same != &candidate && !is_same_function(candidate, same)) continue;
       same.has_uncertain_period = true;
       same.admissible = false;
       same.why_not = why_not;

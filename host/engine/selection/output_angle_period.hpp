@@ -8,8 +8,8 @@
 
 namespace flexspline::selection {
 
-// Sets CandidateFit::has_uncertain_period of such effects, and refuses those where it is set: a wave with half the
-// period, which has as many parameters, explains as much.
+// Sets CandidateFit::has_uncertain_period of such effects, and of what is the same function of the data, and refuses
+// those where it is set: a wave with half the period, which has as many parameters, explains as much.
 void check_output_angle_period(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 
 }  // namespace flexspline::selection
