@@ -105,5 +105,30 @@ TEST(UnfinishedProject, WhatCanBeToleratedStandsInTheLine) {
   shell.must(line);
 }
 
+TEST(UnfinishedProject, AVelocityOfTheOtherSideAsksForTheGearRatio) {
+  const Shell shell;
+  std::string text = "time_s,iq_a,q_actual_rad,motor_speed_rad_s\n";
+  for (int k = 0; k < 4000; ++k) {
+    char line[120];
+    std::snprintf(line, sizeof line, "%.3f,%.6f,%.8f,%.6f\n", 0.001 * k, std::cos(0.006 * k), 0.5 * std::sin(0.006 * k),
+                  120.0 * 3.0 * std::cos(0.006 * k));
+    text += line;
+  }
+  shell.write("log.csv", text);
+  const Answer answer = shell.run("flexspline new --from log.csv --out project --torque-constant 0.1");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(answer.err, "with a gear ratio of about 120")) << answer.err;
+  EXPECT_TRUE(contains(line_to_go_on_with(answer.err), "--gear-ratio NUMBER")) << answer.err;
+}
+
+// How late the current follows it is not known, so it is not taken by itself.
+TEST(UnfinishedProject, ASetPointOfTheCurrentIsProposedWhereNoneIsMeasured) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_s,iq_cmd_A,motor_pos_rad"));
+  const Answer answer = shell.run("flexspline new --from log.csv --out project --torque-constant 0.1");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(line_to_go_on_with(answer.err), "--map current_a=iq_cmd_A")) << answer.err;
+}
+
 }  // namespace
 }  // namespace flexspline::cli_test::unfinished_project_test

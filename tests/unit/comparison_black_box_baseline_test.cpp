@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/engine/comparison/compare.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "host/physics/catalogue/constants.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
@@ -168,17 +169,17 @@ TEST(BlackBoxBaseline, WithoutAnExperimentToFitTheWarningSaysSo) {
 }
 
 TEST(BlackBoxBaseline, TableAndJsonShowThemAndNothingWhereNoneIsAskedFor) {
-  const nlohmann::json j = to_json(linear_comparison());
+  const nlohmann::json j = output::comparison_json(linear_comparison());
   ASSERT_FALSE(j["beside"].empty());
   for (const char* key : {"asked",      "black_box",          "signal",        "unit",     "load",
                           "inputs",     "parameters",         "sample_s",      "samples",  "rmse",
                           "nrmse",      "fit_percent",        "rmse_one_step", "rmse_fit", "rmse_holdout",
                           "model_rmse", "model_rmse_holdout", "largest_pole",  "stable",   "experiments"})
     EXPECT_TRUE(j["beside"][0].contains(key)) << key;
-  EXPECT_NE(table(linear_comparison()).find("Baseline comparison"), std::string::npos);
+  EXPECT_NE(output::comparison_table(linear_comparison()).find("Baseline comparison"), std::string::npos);
   const Comparison plain = compare(linear_data(), linear_model(), {20.0, true});
-  EXPECT_TRUE(to_json(plain)["beside"].empty());
-  EXPECT_EQ(table(plain).find("Baseline comparison"), std::string::npos);
+  EXPECT_TRUE(output::comparison_json(plain)["beside"].empty());
+  EXPECT_EQ(output::comparison_table(plain).find("Baseline comparison"), std::string::npos);
 }
 
 }  // namespace

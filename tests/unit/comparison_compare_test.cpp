@@ -8,6 +8,7 @@
 #include <random>
 
 #include "host/engine/comparison/score.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
 
 namespace flexspline::comparison::comparison_compare_test {
@@ -212,7 +213,7 @@ TEST(Compare, WithoutATorqueSensorMotorAndLoadAreOneBalance) {
 }
 
 TEST(Compare, JsonHasTheFieldsOfItsFormatAndNullForWhatIsNotKnown) {
-  const nlohmann::json j = to_json(compared().comparison);
+  const nlohmann::json j = output::comparison_json(compared().comparison);
   EXPECT_EQ(j["format"], "flexspline-compare/1");
   EXPECT_EQ(j["experiments"][1]["role"], "holdout");
   EXPECT_TRUE(j["parameter_trends"].is_array());
@@ -232,7 +233,7 @@ TEST(Compare, JsonHasTheFieldsOfItsFormatAndNullForWhatIsNotKnown) {
 TEST(Compare, TableHasTheWorstExperimentFirstAndThreeRegionsInWords) {
   model::Model wrong = compared().model;
   *wrong.find("linear_stiffness")->find("stiffness")->value *= 1.2;
-  const std::string text = table(compare(compared().dataset, wrong, {}));
+  const std::string text = output::comparison_table(compare(compared().dataset, wrong, {}));
   const auto locked = text.find("locked (hold-out)"), free = text.find("\nfree");
   ASSERT_NE(locked, std::string::npos);
   ASSERT_NE(free, std::string::npos);

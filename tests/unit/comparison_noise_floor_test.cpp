@@ -156,6 +156,24 @@ TEST(NoiseFloor, DoesNotCountAnEffectThatTheModelLacks) {
   }
 }
 
+// The torsion zero of a record is no noise: the noisy copy of the record has it, too.
+TEST(NoiseFloor, OfThePropagatedNoiseDoesNotChangeWithTheZeroOfTheTorsion) {
+  const model::Model m = known_model(recorded().drive);
+  estimation::PreparedData p = prepared(recorded().measured, m);
+  const auto terms = estimation::terms_of(m);
+  const auto floor_of_locked = [&] {
+    RegressionProblem data(p, Balance::transmission);
+    const auto floors = noise_floors(data, terms, pointers(recorded().measured), m.drive);
+    for (std::size_t k = 0; k < floors.size(); ++k)
+      if (p.records[data.records()[k].record].name == "locked") return floors[k];
+    return NoiseFloor{};
+  };
+  const NoiseFloor before = floor_of_locked();
+  ASSERT_EQ(before.from, "propagated");
+  for (estimation::Record& r : p.records) r.torsion_zero_rad = r.inputs.torsion_zero = 1e-3;
+  EXPECT_NEAR(*floor_of_locked().rmse, *before.rmse, 0.02 * *before.rmse);
+}
+
 TEST(NoiseFloor, GivesTheSameAnswerTwice) {
   const model::Model m = known_model(recorded().drive);
   const auto first = floors_of(recorded().measured, m, Balance::load),

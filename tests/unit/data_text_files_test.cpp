@@ -130,6 +130,13 @@ TEST(TextFiles, AHugeFieldIsNotEchoed) {
   }
 }
 
+TEST(TextFiles, LinesOfTheLoggerMayStandAboveNumbersWithDecimalCommas) {
+  const TestFolder folder;
+  std::string text = "SINUMERIK trace\nNC axis C1, sample cycle 1 ms\nt;i\n";
+  for (int k = 0; k < 50; ++k) text += fmt::format("{},0;{},{:02}\n", k, k / 4, 25 * (k % 4));
+  expect_fifty(only(folder.write("trace.csv", text), kMapped));
+}
+
 TEST(TextFiles, ASparseFileIsRefusedBeforeItIsInMemory) {
   const TestFolder folder;
   const fs::path zeros = folder.write("zeros.csv", "");

@@ -35,5 +35,12 @@ TEST(WarningTexts, OfOneFileStayApart) {
   EXPECT_EQ(warning_texts({gap_in("a.csv", "1"), gap_in("a.csv", "2"), gap_in("a.csv", "3")}).size(), 3U);
 }
 
+TEST(WarningTexts, ErrorsOfOneKindAreJoinedLikewise) {
+  std::vector<Finding> findings = {gap_in("a.csv"), gap_in("b.csv"), gap_in("c.csv"), gap_in("d.csv")};
+  for (Finding& finding : findings) finding.severity = Severity::error;
+  EXPECT_TRUE(warning_texts(findings).empty());
+  EXPECT_EQ(texts_of(findings, Severity::error).size(), 1U);
+}
+
 }  // namespace
 }  // namespace flexspline::data::data_warning_texts_test

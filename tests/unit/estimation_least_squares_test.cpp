@@ -107,6 +107,19 @@ TEST(LeastSquares, KeepsTheFirstOfTwoColumnsThatCannotBeDistinguished) {
   EXPECT_TRUE(std::isfinite(fit.unit_covariance(0, 0)));
 }
 
+// The tolerance of the last of several nearly collinear columns may be above the limit when another one's is below.
+TEST(LeastSquares, ADroppedColumnIsNotDeterminedWhateverItsOwnTolerance) {
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(60, 3);
+  X.col(0).head(20).setOnes();
+  X.col(1) = X.col(0);
+  X.col(1).segment(20, 20).setConstant(0.8 * kUndetermined);
+  X.col(2) = 0.5 * (X.col(0) + X.col(1));
+  X.col(2).tail(20).setConstant(0.6 * kUndetermined);
+  const LinearFit fit = least_squares(X, X.col(0), ones(60));
+  for (Eigen::Index j = 0; j < 3; ++j)
+    EXPECT_EQ(std::isfinite(fit.unit_covariance(j, j)), fit.root_tolerance[j] >= kUndetermined) << j;
+}
+
 TEST(LeastSquares, DropsASumThatStandsBehindItsParts) {
   Eigen::MatrixXd X = random_matrix(60, 3, 9);
   X.col(2) = X.col(0) + X.col(1);

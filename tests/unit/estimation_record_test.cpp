@@ -71,6 +71,21 @@ TEST(PreparedRecord, DerivesVelocityAndAccelerationOfASineFromItsPosition) {
   }
 }
 
+TEST(PreparedRecord, ACountIsAPartOfATurnOrOnALinearAxisOfAMetre) {
+  data::Experiment e = sine(0.2, 1.0, 5.0);
+  e[Column::output_position] = e[Column::motor_position];
+  e.encoder_counts = 2e5;
+  e.output_encoder_counts = 1e5;
+  const Record rotary = prepared(e);
+  EXPECT_DOUBLE_EQ(*rotary.motor_quantum, 2.0 * kPi / 2e5);
+  EXPECT_DOUBLE_EQ(*rotary.output_quantum, 2.0 * kPi / 1e5);
+  model::Drive drive;
+  drive.axis = data::Axis::linear;
+  const Record linear = prepared(e, {40.0, true}, drive);
+  EXPECT_DOUBLE_EQ(*linear.motor_quantum, 1.0 / 2e5);
+  EXPECT_DOUBLE_EQ(*linear.output_quantum, 1.0 / 1e5);
+}
+
 TEST(PreparedRecord, KeepsFourRowsPerPeriodOfTheCutOff) {
   const data::Experiment e = sine(10.0, 1.0, 5.0);
   EXPECT_EQ(prepared(e, {25.0, true}).decimation, 10u);

@@ -68,6 +68,26 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
   EXPECT_EQ(diagnosis_json(d).at("base").at("noise_of_some").at("experiments"), nlohmann::json({"sine"}));
 }
 
+TEST(DiagnosisAnswer, DoesNotSayThatTheNoiseIsUnknownWhereItIsKnown) {
+  selection::Diagnosis d;
+  d.verdict = selection::Verdict::nothing_significant;
+  EXPECT_NE(verdict_in_words(d).find("The noise level is not known"), std::string::npos);
+  d.noise_floor = 1e-3;
+  EXPECT_EQ(verdict_in_words(d).find("not known"), std::string::npos);
+  d.possible = with_possible_effects().possible;
+  EXPECT_EQ(verdict_in_words(d).find("not known"), std::string::npos);
+}
+
+// Of each round only the first name is added to the model.
+TEST(DiagnosisAnswer, OfSeveralRoundsNamesWhatWasAdded) {
+  selection::Diagnosis first, last;
+  first.verdict = selection::Verdict::missing_effect;
+  first.named = {{"gravity", std::nullopt}, {"torque_ripple", 2.0}};
+  const nlohmann::json named = rounds_json({first, last}, {}).at("named");
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_EQ(named[0].at("effect"), "gravity");
+}
+
 TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {
   const nlohmann::json possible = diagnosis_json(with_possible_effects()).at("possible");
   ASSERT_EQ(possible.size(), 2u);

@@ -8,6 +8,7 @@
 
 #include "host/engine/comparison/compare.hpp"
 #include "host/engine/estimation/identify.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "host/output/report/document.hpp"
 #include "host/output/report/page.hpp"
 #include "host/output/report/trace.hpp"
@@ -129,7 +130,7 @@ TEST(ReportPage, StaysSmall) {
 TEST(ReportDocument, NumbersAreThoseOfTheComparison) {
   const comparison::Comparison truth =
       comparison::compare(the_case().dataset, the_case().model, {}, subject_of(the_case()).baselines);
-  json expected = comparison::to_json(truth);
+  json expected = output::comparison_json(truth);
   expected.erase("regions");
   EXPECT_EQ(the_document()["comparison"], expected);
   EXPECT_EQ(the_document()["experiments"], 2);

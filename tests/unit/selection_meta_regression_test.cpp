@@ -154,6 +154,14 @@ TEST(MetaRegression, OfAnEffectThatIsAlikeInAllRecordsExplainsNothing) {
   EXPECT_FALSE(is_possible(fit));
 }
 
+TEST(MetaRegression, OfRecordsThatDoNotDifferExplainsNothing) {
+  MatrixXd theta = MatrixXd::Constant(6, 1, 0.3), added(6, 1);
+  added << 1, 2, 3, 4, 5, 6;
+  RecordParameters records = exact(theta);
+  records.variance.setConstant(1e-4);
+  EXPECT_EQ(meta_regression(records, added).explained_share, 0.0);
+}
+
 // RecordsWithLaw of a slow and of a fast kind, which do not identify the same parameters.
 RecordParameters two_kinds(const RecordsWithLaw& r, Index slow) {
   RecordParameters records = exact(r.theta);

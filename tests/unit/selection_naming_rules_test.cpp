@@ -59,7 +59,7 @@ TEST(NamingRules, RefuseWhatFewHalvesChoseWithoutConfirmation) {
   term.frequency = kPolicy.min_frequency_of_all - 0.01;
   EXPECT_EQ(why_not(term), "");
   term.held_out_ratio = 0.99;
-  EXPECT_EQ(why_not(term), "the error on experiments that are held out falls by 1.0 % only");
+  EXPECT_EQ(why_not(term), "the squared error on experiments that are held out falls by 2.0 % only");
 }
 
 TEST(NamingRules, RefuseASecondChoiceWithoutConfirmation) {
@@ -78,7 +78,7 @@ TEST(NamingRules, RefusePreslidingThatFewerThanNineOfTenHalvesChoseUnlessHeldOut
   term.held_out_ratio.reset();
   EXPECT_EQ(why_not(term), "without experiments that are held out 90 of 100 are needed");
   term.held_out_ratio = 0.99;
-  EXPECT_EQ(why_not(term), "the error on experiments that are held out falls by 1.0 % only");
+  EXPECT_EQ(why_not(term), "the squared error on experiments that are held out falls by 2.0 % only");
   term.frequency = kPolicy.certain_frequency;
   EXPECT_EQ(why_not(term), "");
 }
@@ -105,7 +105,7 @@ TEST(NamingRules, RefuseWhatIsNotCertainBehindANameUnlessHeldOutDataConfirmIt) {
   term.frequency = kPolicy.certain_frequency - 0.01;
   term.held_out_ratio = 0.99;
   EXPECT_EQ(why_not(term), "");
-  EXPECT_EQ(why_not(term, kBefore), "the error on experiments that are held out falls by 1.0 % only");
+  EXPECT_EQ(why_not(term, kBefore), "the squared error on experiments that are held out falls by 2.0 % only");
   term.frequency = kPolicy.certain_frequency;
   EXPECT_EQ(why_not(term, kBefore), "");
 }
@@ -130,6 +130,22 @@ TEST(NamingRules, GiveTheirReasonsToThePossibleEffects) {
   ASSERT_EQ(result.possible.size(), 1u);
   EXPECT_EQ(result.possible.front().group.front().effect, "quadratic_drag");
   EXPECT_EQ(result.possible.front().why_not, "the error on experiments that are held out rises by 50.0 % with it");
+}
+
+TEST(UnknownStructure, IsCertainWhereHeldOutDataConfirmItOrNearlyAllHalvesChoseIt) {
+  Resampling::FoundTerm term = found({});
+  term.frequency = 0.95;
+  EXPECT_TRUE(term.is_unknown_structure());
+  term.frequency = 0.8;
+  EXPECT_FALSE(term.is_unknown_structure());
+  term.held_out_ratio = 0.93;  // squared 0.86
+  EXPECT_TRUE(term.is_unknown_structure());
+  term.held_out_ratio = 0.96;
+  EXPECT_FALSE(term.is_unknown_structure());
+  term.held_out_ratio = 0.5;
+  term.refused_by_holdout = true;
+  EXPECT_FALSE(term.is_unknown_structure());
+  EXPECT_FALSE(found({"quadratic_drag"}).is_unknown_structure());
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "host/engine/selection/decision.hpp"
+#include "host/engine/selection/frequent_groups.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/stability_selection.hpp"
 #include "shared/fixed/turn.hpp"
@@ -61,7 +61,7 @@ class SelectionOnHalves : public ::testing::Test {
 TEST_F(SelectionOnHalves, ChoosesTheMissingEffectInNearlyAllSubsamples) {
   const StabilitySelection all = selection();
   EXPECT_GT(frequency(all, "viscous_asymmetry"), 0.9);
-  const auto found = decide(all.result(), kPolicy);
+  const auto found = frequent_groups(all.result(), kPolicy);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found.front().group.front().name, "viscous_asymmetry");
 }

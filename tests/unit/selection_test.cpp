@@ -13,8 +13,8 @@
 
 #include "host/engine/estimation/variance_components.hpp"
 #include "host/engine/selection/bandwidth.hpp"
-#include "host/engine/selection/decision.hpp"
 #include "host/engine/selection/forward_selection.hpp"
+#include "host/engine/selection/frequent_groups.hpp"
 #include "host/engine/selection/friction_random_effects.hpp"
 #include "host/engine/selection/halves.hpp"
 
@@ -289,7 +289,7 @@ TEST(ForwardSelection, AbstainsWhereTheModelAloneDoesNotCarryOver) {
   r.rows.topRows(200).col(1).setZero();
   r.rows.bottomRows(200).col(4) += 3.0 * r.rows.bottomRows(200).col(1);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
-  EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {}).extrapolates);
+  EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {}).abstains);
 }
 
 TEST(ForwardSelection, ATermOfImpossibleSignIsNotChosen) {
@@ -325,7 +325,7 @@ TEST(Decision, NamesWhatIsChosenOftenEnoughAlone) {
   Stability s;
   s.subsamples = 100.0;
   s.frequencies = {frequency("often", 0.8, 0.8, 0.5), frequency("seldom", 0.4, 0.45, 0.5)};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].group.size(), 1U);
   EXPECT_EQ(found[0].group[0].name, "often");
@@ -337,7 +337,7 @@ TEST(Decision, WhatNeitherEnoughSubsamplesChoseNorEnoughDidNotIsUndecided) {
   s.frequencies = {frequency("often", 0.8, 0.8, 0.5), frequency("half", 0.5, 0.5, 0.5),
                    frequency("curve", 0.5, 0.5, 0.5), frequency("seldom", 0.35, 0.39, 0.5)};
   s.frequencies[2].entry = nullptr;
-  const auto open = undecided(s, decide(s, {}), {});
+  const auto open = undecided(s, frequent_groups(s, {}), {});
   ASSERT_EQ(open.size(), 1U);
   EXPECT_EQ(open[0].group[0].name, "half");
   s.abstained = 80.0;
@@ -350,7 +350,7 @@ TEST(Decision, WhatIsChosenOftenButNotOftenEnoughBehindAnUnknownStructureIsUndec
   s.frequencies = {frequency("curve", 0.8, 0.8, 0.2), frequency("law", 0.8, 0.8, 0.7)};
   s.frequencies[0].entry = nullptr;
   s.frequencies[0].first = 1.0;
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   const auto open = undecided(s, found, {});
   ASSERT_EQ(open.size(), 1U);
@@ -362,9 +362,9 @@ TEST(Decision, WhatIsNotChosenWithReversalsOrNotWithoutThemIsUndecided) {
   s.subsamples = 100.0;
   s.frequencies = {frequency("law", 0.7, 0.7, 0.5)};
   s.frequencies[0].least_near_by_mask = 0.41;
-  EXPECT_EQ(decide(s, {}).size(), 1U);
+  EXPECT_EQ(frequent_groups(s, {}).size(), 1U);
   s.frequencies[0].least_near_by_mask = 0.39;
-  EXPECT_TRUE(decide(s, {}).empty());
+  EXPECT_TRUE(frequent_groups(s, {}).empty());
   const auto open = undecided(s, {}, {});
   ASSERT_EQ(open.size(), 1U);
   EXPECT_EQ(open[0].least_by_mask, 0.39);
@@ -375,7 +375,7 @@ TEST(Decision, GroupsWhatTakesTurns) {
   s.subsamples = 100.0;
   s.frequencies = {frequency("one", 0.5, 0.9, 0.5), frequency("other", 0.4, 0.9, 0.5)};
   s.frequencies[0].alternatives = {{"other", 0.8}};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].group.size(), 2U);
   EXPECT_NEAR(found[0].frequency, 0.9, 1e-12);
@@ -389,7 +389,7 @@ std::vector<FoundTerm> with_unknown_structure(double law_first, double law_frequ
   s.frequencies[0].entry = nullptr;
   s.frequencies[0].first = 1.0 - law_first;
   s.frequencies[1].first = law_first;
-  return decide(s, {});
+  return frequent_groups(s, {});
 }
 
 TEST(Decision, ALawThatComesBeforeAnUnknownStructureNeedsTheOrdinaryFrequency) {
@@ -410,7 +410,7 @@ TEST(Decision, ATermThatMayTakeTheFirstOnesPlaceIsInItsGroupThoughItIsAlsoChosen
   s.frequencies[0].first = 0.1;
   s.frequencies[1].first = 0.4;
   s.frequencies[1].alternatives = {{"gravity", 0.9}};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].group.size(), 2U);
 }
@@ -428,7 +428,7 @@ TEST(Decision, APlaceboThatDoesAsWellAsAWaveMakesItUnknown) {
   s.subsamples = 100.0;
   s.frequencies = {wave("order 6", 6.0, 0.65, 0.5), wave("placebo order 5.31", 5.31, 0.3, 0.5, true)};
   s.frequencies[0].alternatives = {{"placebo order 5.31", 0.8}};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_FALSE(found[0].in_catalogue);
 }
@@ -439,7 +439,7 @@ TEST(Decision, APlaceboWaveSaysNothingAgainstALawThatIsNoWave) {
   s.frequencies = {frequency("gravity", 0.9, 0.95, 0.5), wave("order 2", 2.0, 0.05, 0.5),
                    wave("placebo order 2.73", 2.73, 0.05, 0.5, true)};
   s.frequencies[0].alternatives = {{"order 2", 0.8}, {"placebo order 2.73", 0.8}};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_TRUE(found[0].in_catalogue);
   EXPECT_EQ(found[0].group.size(), 1U);
@@ -455,7 +455,7 @@ TEST(Decision, WavesThatAreRefutedByALawAreNotFoundASecondTimeByThemselves) {
   s.frequencies[1].first = 0.4;
   s.frequencies[0].alternatives = {{"order 1", 0.9}, {"placebo order 1.27", 0.9}};
   s.frequencies[1].alternatives = {{"gravity", 0.9}, {"placebo order 1.27", 0.9}};
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].group.front().name, "gravity");
   EXPECT_TRUE(undecided(s, found, {}).empty());
@@ -468,20 +468,20 @@ TEST(Decision, AnEffectOfOneParameterThatDoesAsWellAsTheWavesIsTakenForThem) {
                    frequency("offset", 0.2, 0.9, 0.9)};
   s.frequencies[0].alternatives = {{"placebo order 1.27", 0.9}, {"offset", 0.9}};
   s.frequencies[2].near = 0.9;
-  const auto found = decide(s, {});
+  const auto found = frequent_groups(s, {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_TRUE(found[0].in_catalogue);
   EXPECT_EQ(found[0].group.front().name, "offset");
   s.frequencies[2].near = 0.5;
-  ASSERT_EQ(decide(s, {}).size(), 1U);
-  EXPECT_FALSE(decide(s, {})[0].in_catalogue) << "it does as well in half of the subsamples only";
+  ASSERT_EQ(frequent_groups(s, {}).size(), 1U);
+  EXPECT_FALSE(frequent_groups(s, {})[0].in_catalogue) << "it does as well in half of the subsamples only";
 }
 
 TEST(Decision, AWaveIsNotSaidBesideAPlaceboWaveThatTakesOffAsMuch) {
   Stability s;
   s.subsamples = 100.0;
   s.frequencies = {wave("order 10", 10.0, 0.95, 0.07), wave("placebo order 9.71", 9.71, 0.7, 0.05, true)};
-  for (const auto& found : decide(s, {})) EXPECT_FALSE(found.in_catalogue);
+  for (const auto& found : frequent_groups(s, {})) EXPECT_FALSE(found.in_catalogue);
 }
 
 TEST(Decision, NothingIsSaidWhereMostSubsamplesAbstain) {
@@ -489,7 +489,7 @@ TEST(Decision, NothingIsSaidWhereMostSubsamplesAbstain) {
   s.subsamples = 100.0;
   s.abstained = 80.0;
   s.frequencies = {frequency("often", 0.9, 0.9, 0.9)};
-  EXPECT_TRUE(decide(s, {}).empty());
+  EXPECT_TRUE(frequent_groups(s, {}).empty());
 }
 
 }  // namespace

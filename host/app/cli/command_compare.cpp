@@ -8,6 +8,7 @@
 #include "host/app/cli/common_options.hpp"
 #include "host/app/cli/report_option.hpp"
 #include "host/engine/comparison/compare.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 
@@ -79,7 +80,7 @@ int run(const CompareOptions& options, Console& console) {
   const comparison::Comparison comparison =
       comparison::compare(dataset, file.model, options.pipeline.options(), baselines);
   for (const std::string& warning : comparison.warnings) console.warn(warning);
-  console.line(comparison::table(comparison));
+  console.line(output::comparison_table(comparison));
   if (!options.report.empty())
     write_report(options.report,
                  {.command = "compare",
@@ -90,7 +91,7 @@ int run(const CompareOptions& options, Console& console) {
                   .pipeline = options.pipeline.options(),
                   .baselines = baselines},
                  console);
-  output::save_json(options.json, comparison::to_json(comparison));
+  output::save_json(options.json, output::comparison_json(comparison));
   bool all_kept = true;
   for (const Limit& limit : limits) all_kept = is_kept(limit, comparison, console) && all_kept;
   return all_kept ? kDone : kNotMet;

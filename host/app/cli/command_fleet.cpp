@@ -14,6 +14,7 @@
 #include "host/engine/estimation/estimate.hpp"
 #include "host/engine/selection/diagnosis.hpp"
 #include "host/input/data/recording.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "host/output/answers/diagnosis.hpp"
 #include "host/output/answers/identification.hpp"
 #include "host/output/answers/json.hpp"
@@ -108,7 +109,7 @@ json result_of(const FleetOptions& options, const Task& task, Console& console) 
   console.progress("comparing model and measurement");
   json errors = json::array();
   try {
-    errors = comparison::to_json(comparison::compare(dataset, found->model, pipeline))["overall"];
+    errors = output::comparison_json(comparison::compare(dataset, found->model, pipeline))["overall"];
   } catch (const model::ModelError& error) {
     // Measurements that do not show every effect of the model still identify the other parameters.
     console.warn(fmt::format("{}: {}", task.name, error.what()));

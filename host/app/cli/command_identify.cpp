@@ -118,7 +118,7 @@ void declare(Parser& parser, IdentifyOptions& options) {
   parser
       .option("--intervals", options.intervals,
               "standard: from standard errors, wider where twice the cut-off changes a value; profile: profile "
-              "likelihood; bootstrap: moving-block bootstrap (ls and nls)")
+              "likelihood; bootstrap: of blocks of samples (ls and nls)")
       .one_of({"standard", "profile", "bootstrap"})
       .shows_default()
       .value("");

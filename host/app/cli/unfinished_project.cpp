@@ -115,6 +115,10 @@ std::string missing_maps(const project::Draft& draft, const project::Request& re
       else if (!project::unknown_unit_in_name(theirs).empty())
         theirs += ":UNIT";
     }
+    // A set point is not taken by itself: how late the current follows is not known.
+    const auto set_point = std::ranges::find(draft.columns, "current_command_a", &project::ColumnGuess::ours);
+    if (theirs == "NAME" && missing.kind == Kind::current && set_point != draft.columns.end())
+      theirs = set_point->theirs;
     line += fmt::format(" --map {}", quoted(fmt::format("{}={}", missing.ours, theirs)));
   }
   return line;
@@ -147,12 +151,15 @@ std::string tolerations(const std::vector<data::Finding>& errors) {
   return line;
 }
 
-// A number of counts a turn, where a position in counts needs it.
-std::string missing_counts(const std::vector<data::Finding>& errors) {
-  const bool is_missing = std::any_of(errors.begin(), errors.end(), [](const data::Finding& error) {
-    return error.remedy.find("write encoder_counts ") != std::string::npos;
-  });
-  return is_missing ? " --encoder-counts NUMBER" : "";
+// A number of counts a turn, where a position in counts needs it, and the gear ratio where a velocity may be that of
+// the other side.
+std::string missing_numbers(const std::vector<data::Finding>& errors) {
+  const auto says = [&](std::string_view words) {
+    return std::any_of(errors.begin(), errors.end(),
+                       [&](const data::Finding& error) { return error.text().find(words) != std::string::npos; });
+  };
+  return std::string(says("write encoder_counts ") ? " --encoder-counts NUMBER" : "") +
+         (says("state gear_ratio then") ? " --gear-ratio NUMBER" : "");
 }
 
 }  // namespace
@@ -174,11 +181,11 @@ void leave_unfinished(const project::Draft& draft, const project::Request& reque
   text.insert(end_of_first, mark_of(std::string_view(text).substr(end_of_first + 1)));
   model::save(file, text);
   const std::vector<data::Finding> errors = findings_of(why, data::Severity::error);
-  for (const data::Finding& error : errors) console.error(error.text());
+  for (const std::string& error : data::texts_of(errors, data::Severity::error)) console.error(error);
   for (const std::string& warning : data::warning_texts(warnings_of_units(why))) console.warn(warning);
   if (errors.empty()) console.error(why.what());
   std::string line = as_given(request) + missing_maps(draft, request) + missing_units(draft, errors) +
-                     missing_counts(errors) + tolerations(errors);
+                     missing_numbers(errors) + tolerations(errors);
   if (!draft.open_question.empty()) line += " --position-side SIDE";
   console.error(
       fmt::format("{} holds what could be found; replace NAME, UNIT, PERIOD, NUMBER, SIDE or a wrong name by the right "

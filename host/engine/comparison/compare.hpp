@@ -1,7 +1,6 @@
 // A model with values against measurements: by experiment, by signal, and by region of what the error may depend on.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -84,11 +83,5 @@ Comparison compare(const data::Dataset& dataset, const model::Model& model, cons
 
 // Throws model::ModelError naming the parameters without a value, if there are any.
 void require_values(const model::Model& model);
-
-// "flexspline-compare/1". What is not known or not finite is null.
-nlohmann::json to_json(const Comparison& comparison);
-
-// For a terminal: experiments worst first, then the three regions with the largest excess, in words.
-std::string table(const Comparison& comparison);
 
 }  // namespace flexspline::comparison

@@ -9,6 +9,7 @@
 #include "host/engine/comparison/full_rate.hpp"
 #include "host/engine/estimation/balance_fit.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
+#include "host/engine/estimation/prepared_again.hpp"
 #include "host/input/data/period.hpp"
 
 namespace flexspline::comparison {
@@ -180,7 +181,7 @@ class Floors {
  public:
   Floors(const RegressionProblem& data, const Terms& terms, const std::vector<const Experiment*>& experiments,
          const model::Drive& drive)
-      : data_(data), terms_(terms), experiments_(experiments), drive_(drive), prepared_(data.prepared()) {
+      : data_(data), terms_(terms), experiments_(experiments), prepared_(data.prepared()) {
     turns_known_ = drive.axis == data::Axis::rotary || drive.pitch_m.value.has_value();
   }
 
@@ -225,14 +226,21 @@ class Floors {
     for (const Experiment* other : experiments_) {
       if (other == record.experiment || other->name == record.name || !are_replicates(*record.experiment, *other))
         continue;
-      PreparedData theirs = estimation::prepare_with({other}, drive_, prepared_.pipeline);
-      theirs.output_signals = prepared_.output_signals;
-      theirs.constants = prepared_.constants;
+      const Record its = record_of(*other, record);
       const auto a = full_rate(prepared_, record, data_.balance(), terms_);
-      const auto b = full_rate(theirs, theirs.records[0], data_.balance(), terms_);
-      if (a && b) pairs.add(*a, record, *b, theirs.records[0], 0.0, same_motion(record, prepared_, turns_known_));
+      const auto b = full_rate(prepared_, its, data_.balance(), terms_);
+      if (a && b) pairs.add(*a, record, *b, its, 0.0, same_motion(record, prepared_, turns_known_));
     }
     return pairs.rmse(record.decimation);
+  }
+
+  // Of an experiment that is perhaps not among those prepared; the zero of its torsion is then that of its replicate.
+  Record record_of(const Experiment& experiment, const Record& replicate) const {
+    const auto found = std::ranges::find(prepared_.records, &experiment, &Record::experiment);
+    if (found != prepared_.records.end()) return *found;
+    Record record = estimation::prepare_as(prepared_, prepared_.pipeline, {&experiment}, terms_).records[0];
+    estimation::take_torsion_zero(record, replicate);
+    return record;
   }
 
   // The record contains its noise already. Adding the same amount again and taking the difference shows its effect on
@@ -241,11 +249,8 @@ class Floors {
     double sum = 0.0;
     for (int realisation = 0; realisation < kRealisations; ++realisation) {
       const Experiment noisy = with_noise(record, static_cast<std::uint64_t>(realisation) + 1);
-      PreparedData again = estimation::prepare_with({&noisy}, drive_, prepared_.pipeline);
-      again.output_signals = prepared_.output_signals;
-      again.constants = prepared_.constants;
-      again.records[0].at_rest = record.at_rest;
-      again.records[0].rows = record.rows;  // the mask depends on the noise
+      PreparedData again = estimation::prepare_as(prepared_, prepared_.pipeline, {&noisy}, terms_);
+      estimation::take_decisions(again.records[0], record);  // the mask depends on the noise
       RegressionProblem data(again, data_.balance());
       if (data.rows() != residual.size()) return std::nullopt;
       sum += (data.residual(terms_) - residual).squaredNorm();
@@ -256,7 +261,6 @@ class Floors {
   const RegressionProblem& data_;
   const Terms& terms_;
   const std::vector<const Experiment*>& experiments_;
-  const model::Drive& drive_;
   const PreparedData& prepared_;
   bool turns_known_ = false;
 };

@@ -1,6 +1,6 @@
 // What each experiment alone says of a parameter, and how far the experiments agree: std/avg, the report's measure of
-// reliability. An experiment is judged by its own standard error, never by that of the pooled fit: one that disagrees
-// with the others would otherwise be left out for its disagreement.
+// reliability. The reliability of an experiment is that of its own standard error, never by that of the pooled fit: one
+// that disagrees with the others would otherwise be left out for its disagreement.
 #pragma once
 
 #include <Eigen/Core>

@@ -53,7 +53,7 @@ struct SideMotion {
 // Where an experiment has it.
 struct SideColumns {
   Column position, velocity;
-  std::optional<double> counts;  // of the encoder, a turn
+  std::optional<double> step;  // of the encoder, where it is stated
 };
 
 // The share of white noise that a filter keeps.
@@ -183,8 +183,7 @@ bool is_long_enough(const std::vector<Segment>& segments) {
 SideMotion side_from_position(const Experiment& e, const SideColumns& columns, const ZeroPhaseFilter& filter,
                               Derivatives derivatives) {
   const std::vector<double>& position = e[columns.position];
-  const std::optional<double> quantum =
-      columns.counts ? std::optional(2.0 * M_PI / *columns.counts) : signals::quantum_of(position);
+  const std::optional<double> quantum = columns.step ? columns.step : signals::quantum_of(position);
   if (derivatives == Derivatives::kalman && is_long_enough(e.segments))
     if (auto smoothed = smoothed_side(position, quantum, e)) return std::move(*smoothed);
   SideMotion side = motion_from_position(position, e.segments, filter, e.sample_s);
@@ -285,21 +284,20 @@ void take_torques(Record& r, const Experiment& e, const catalogue::DriveConstant
 }
 
 // Motion of both sides, the noise of their directions, and whether the drive is off.
-void take_motion(Record& r, const Experiment& e, const catalogue::DriveConstants<double>& drive,
-                 const ZeroPhaseFilter& filter, Derivatives derivatives) {
-  SideMotion motor = side_of(
-      e,
-      {Column::motor_position, Column::motor_velocity, drive.turn_angle_scale == 1.0 ? e.encoder_counts : std::nullopt},
-      filter, derivatives);
+void take_motion(Record& r, const Experiment& e, const PreparedData& prepared, const ZeroPhaseFilter& filter,
+                 Derivatives derivatives) {
+  const double gear_ratio = prepared.constants.gear_ratio;
+  const auto side = [&](Column position, Column velocity, const std::optional<double>& counts) {
+    return side_of(e, {position, velocity, data::encoder_step(counts, prepared.drive.axis)}, filter, derivatives);
+  };
+  SideMotion motor = side(Column::motor_position, Column::motor_velocity, e.encoder_counts);
   if (motor.measured && !e.has(Column::motor_position)) {
     const double kept = kept_share(filter, e.sample_s);
     motor.velocity_noise =
         root_mean_square_of_rest(e[Column::motor_velocity], motor.velocity) * std::sqrt(kept / (1.0 - kept));
   }
   SideMotion output;
-  if (!r.locked)
-    output =
-        side_of(e, {Column::output_position, Column::output_velocity, e.output_encoder_counts}, filter, derivatives);
+  if (!r.locked) output = side(Column::output_position, Column::output_velocity, e.output_encoder_counts);
   r.has_motor_motion = motor.measured;
   r.has_output_motion = output.measured || r.locked;
   r.motor_quantum = motor.quantum;
@@ -307,11 +305,10 @@ void take_motion(Record& r, const Experiment& e, const catalogue::DriveConstants
   r.smoother_corner_hz = motor.smoother_corner_hz;
   r.output_quantum = output.quantum;
   r.velocity_noise[index(Balance::motor)] = motor.velocity_noise;
-  r.velocity_noise[index(Balance::load)] = r.has_output_motion && output.velocity_noise > 0.0
-                                               ? output.velocity_noise
-                                               : motor.velocity_noise / drive.gear_ratio;
+  r.velocity_noise[index(Balance::load)] =
+      r.has_output_motion && output.velocity_noise > 0.0 ? output.velocity_noise : motor.velocity_noise / gear_ratio;
   r.velocity_noise[index(Balance::transmission)] =
-      std::hypot(motor.velocity_noise / drive.gear_ratio, r.locked ? 0.0 : output.velocity_noise);
+      std::hypot(motor.velocity_noise / gear_ratio, r.locked ? 0.0 : output.velocity_noise);
   if (r.has_motor_motion) {
     const std::vector<double>& p = e.has(Column::motor_position) ? e[Column::motor_position] : motor.position;
     const auto [low, high] = std::minmax_element(p.begin(), p.end());
@@ -329,7 +326,8 @@ void take_motion(Record& r, const Experiment& e, const catalogue::DriveConstants
 
 }  // namespace
 
-Record with_signals(const Experiment& e, const catalogue::DriveConstants<double>& drive, const Pipeline& pipeline) {
+Record with_signals(const Experiment& e, const PreparedData& prepared, const Pipeline& pipeline) {
+  const catalogue::DriveConstants<double>& drive = prepared.constants;
   Record r;
   r.experiment = &e;
   r.name = e.name;
@@ -349,7 +347,7 @@ Record with_signals(const Experiment& e, const catalogue::DriveConstants<double>
   r.inputs.locked = r.locked;
   r.settling = filter.settling_samples();
   take_torques(r, e, drive, filter);
-  take_motion(r, e, drive, filter, pipeline.derivatives);
+  take_motion(r, e, prepared, filter, pipeline.derivatives);
   r.inputs.keep_directions();
   return r;
 }

@@ -9,9 +9,9 @@
 namespace flexspline::estimation {
 
 // All of a record but its rows. Positions, where there are any, give velocity and acceleration; a tachometer helps
-// where it has less noise, and stands alone without them.
-Record with_signals(const data::Experiment& e, const catalogue::DriveConstants<double>& drive,
-                    const Pipeline& pipeline);
+// where it has less noise, and stands alone without them. `prepared` gives the drive and its constants; its own
+// pipeline is not read.
+Record with_signals(const data::Experiment& e, const PreparedData& prepared, const Pipeline& pipeline);
 
 // A signal through a filter, segment by segment.
 std::vector<double> filtered(const std::vector<double>& signal, const std::vector<data::Segment>& segments,

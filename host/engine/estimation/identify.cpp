@@ -143,9 +143,11 @@ std::vector<std::vector<ParameterRef>> fit_all(Identification& result, data::Axi
   for (std::size_t b = 0; b < result.data.size() && reach && result.prepared.output_signals.torque; ++b)
     for (std::size_t other = 0; other < result.data.size(); ++other)
       if (other != b && result.data[other].balance() == Balance::motor && combine_balances(result, b, other)) {
-        std::vector<std::string> warned_before;
-        std::tie(result.fits[other], held[other]) =
-            fit_within_bounds(result.data[other], result.terms, axis, warned_before);
+        std::vector<std::string> warnings;
+        std::tie(result.fits[other], held[other]) = fit_within_bounds(result.data[other], result.terms, axis, warnings);
+        for (std::string& warning : warnings)
+          if (std::ranges::find(result.warnings, warning) == result.warnings.end())
+            result.warnings.push_back(std::move(warning));
       }
   return held;
 }

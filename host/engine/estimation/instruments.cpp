@@ -10,6 +10,7 @@
 #include "host/engine/estimation/free_motion.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
+#include "host/physics/catalogue/catalogue.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -30,13 +31,14 @@ void move(const RegressionProblem& data, Terms& terms, const ParameterRef& ref, 
   }
 }
 
-void refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms, BalanceFit& fit) {
+// Returns whether the instruments determine the parameters; else the fit stays as it was.
+bool refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms, BalanceFit& fit) {
   RegressionProblem simulated(motion.prepared, data.balance());
-  if (data.empty() || simulated.rows() != data.rows()) return;
+  if (data.empty() || simulated.rows() != data.rows()) return false;
   std::vector<Eigen::Index> kept;  // what the data determine
   for (Eigen::Index j = 0; j < fit.root_tolerance.size(); ++j)
     if (fit.root_tolerance[j] >= kUndetermined) kept.push_back(j);
-  if (kept.empty()) return;
+  if (kept.empty()) return false;
   const auto count = static_cast<Eigen::Index>(kept.size());
   const auto linear = static_cast<Eigen::Index>(fit.linear.size());
   Eigen::MatrixXd A(data.rows(), count), Z(data.rows(), count);
@@ -55,7 +57,7 @@ void refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms
     const Eigen::VectorXd instrument_size = Z.colwise().norm().transpose().array().max(1e-300);
     const Eigen::MatrixXd zs = Z * instrument_size.cwiseInverse().asDiagonal();
     const algebra::FullPivotLu normal(zs.transpose() * A * size.cwiseInverse().asDiagonal());
-    if (normal.reciprocal_condition() < 1e-9) return;  // the free run does not excite this parameter
+    if (normal.reciprocal_condition() < 1e-9) return false;  // the free run does not excite a parameter
     const Eigen::VectorXd by = normal.solve(zs.transpose() * fit.root_weights.cwiseProduct(fit.residual));
     for (Eigen::Index j = 0; j < count; ++j) {
       const Eigen::Index at = kept[static_cast<std::size_t>(j)];
@@ -79,6 +81,7 @@ void refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms
         fit.covariance(kept[static_cast<std::size_t>(i)], kept[static_cast<std::size_t>(j)]) =
             scaled(i, j) / (size[i] * size[j]);
   }
+  return true;
 }
 
 }  // namespace
@@ -86,8 +89,14 @@ void refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms
 void refit_with_instruments(Identification& identification) {
   for (int run = 0; run < kFreeRuns; ++run) {
     const FreeMotion motion = free_motion(identification);
-    for (std::size_t b = 0; b < identification.data.size(); ++b)
-      refit(identification.data[b], motion, identification.terms, identification.fits[b]);
+    for (std::size_t b = 0; b < identification.data.size(); ++b) {
+      const RegressionProblem& data = identification.data[b];
+      if (!refit(data, motion, identification.terms, identification.fits[b]) && run + 1 == kFreeRuns)
+        identification.warnings.push_back(fmt::format(
+            "the free runs do not determine the parameters of the {} balance: its values are those of least "
+            "squares, or of an earlier run",
+            catalogue::balance_name(data.balance())));
+    }
     if (run + 1 < kFreeRuns) continue;
     std::string without;
     for (std::size_t i = 0; i < motion.simulated.size(); ++i)

@@ -18,8 +18,8 @@ using Progress = std::function<void(std::string_view)>;
 // that is not reached within the parameter's range stays open, with a warning.
 void profile(Identification& identification, const Progress& progress);
 
-// Moving-block bootstrap: samples are drawn again in blocks of several autocorrelation times, `replicates` times, and
-// all parameters of the balance fitted; 2.5 and 97.5 % of what comes out. The same seed gives the same intervals.
+// Block bootstrap (Carlstein 1986): fixed blocks of several autocorrelation times are drawn again, `replicates` times,
+// and all parameters of the balance fitted; 2.5 and 97.5 % of what comes out. The same seed gives the same intervals.
 void bootstrap(Identification& identification, int replicates, std::uint64_t seed, const Progress& progress);
 
 }  // namespace flexspline::estimation

@@ -67,6 +67,7 @@ LinearFit least_squares(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, cons
       Eigen::Index out = worst;
       for (Eigen::Index j = 0; j < count; ++j)
         if (own[j] < 3.0 * own[worst]) out = j;
+      fit.root_tolerance[kept[static_cast<std::size_t>(out)]] = own[worst];
       kept.erase(kept.begin() + out);
       continue;
     }

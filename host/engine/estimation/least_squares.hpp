@@ -31,8 +31,7 @@ LinearFit generalised_least_squares(const Eigen::MatrixXd& X, const Eigen::Vecto
                                     const NoiseCovariance& error_covariance);
 
 // Square roots of weights: one over the residual's RMS of each record, repeated along its samples: records with more
-// noise count less. A record is never weighted more than ten times the median one, so that a silent record does not
-// rule the fit.
+// noise count less. No root weight is above ten times the median one, so that a silent record does not rule the fit.
 Eigen::VectorXd root_record_weights(const std::vector<RowRange>& records, const Eigen::VectorXd& residual);
 
 // What neighbouring samples have in common, in a covariance (Newey and West 1987): the sum over lags of the products of

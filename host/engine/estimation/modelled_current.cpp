@@ -20,6 +20,13 @@ double passed_on(const PreparedData& prepared, const Record& r, std::size_t samp
 
 }  // namespace
 
+bool reads_modelled_current(const Term& term) {
+  if (term.entry->definition) return false;
+  const bool is_nonlinear =
+      term.entry->info->reads == effects::kCurrent && term.entry->count(effects::Kind::linear) > 0;
+  return term.entry->has_state || is_nonlinear;
+}
+
 void take_modelled_current(PreparedData& prepared, const Terms& terms) {
   if (!prepared.effort_is_current || std::any_of(terms.begin(), terms.end(), remembers_current)) return;
   const RegressorEvaluator motor(prepared, Balance::motor);

@@ -6,6 +6,11 @@
 
 namespace flexspline::estimation {
 
+// Whether the torque of a term is that of the modelled current, where the records have one. A memory of the measured
+// current averages its noise, and a coefficient of a nonlinear function of it is estimated from noise that is in the
+// effort, too. A limit of the current shows in the measured one alone.
+bool reads_modelled_current(const Term& term);
+
 // Gives the records the current that `terms`, with values, make of motion and load, A, for effects with a memory of the
 // current, or nonlinear in it (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no
 // current is measured.

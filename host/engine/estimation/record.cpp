@@ -146,7 +146,7 @@ void make_records(PreparedData& prepared, const std::vector<const Experiment*>& 
     }
     throw_if_cancelled();
     Record& record = prepared.records[i];
-    record = with_signals(*experiments[i], prepared.constants, prepared.pipeline);
+    record = with_signals(*experiments[i], prepared, prepared.pipeline);
     choose_rows(record, prepared.pipeline);
     if (prepared.pipeline.torque_per_step != 0.0)
       correct_zero_order_hold(record, prepared.constants, prepared.pipeline.torque_per_step);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "host/engine/estimation/filtered_columns.hpp"
+#include "host/engine/estimation/modelled_current.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -41,14 +42,6 @@ const catalogue::BlockFunctions<N>& functions_of(const catalogue::Entry& entry) 
     return entry.real;
   else
     return entry.dual;
-}
-
-// A memory of the measured current averages its noise, and a coefficient of a nonlinear function of it is estimated
-// from noise that is in the effort, too: both read the modelled one. A limit of the current shows in the measured one
-// alone.
-bool reads_modelled_current(const Term& term) {
-  if (term.entry->definition) return false;
-  return term.entry->has_state || (term.entry->info->reads == effects::kCurrent && term.entry->count(Kind::linear) > 0);
 }
 
 // Signals that a term's torque reads. kWholeRecord for effects with memory, with inputs that others change, of the

@@ -11,7 +11,7 @@
 #include "host/engine/estimation/filtered_signals.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/modelled_torque.hpp"
+#include "host/engine/estimation/prepared_again.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
 
 namespace flexspline::estimation {
@@ -92,16 +92,9 @@ Linearised linearised(const RegressionProblem& data, const BalanceFit& fit, cons
 // All balances of the same samples, from these experiments in place of the measured ones.
 std::vector<Linearised> of_others(const Identification& found, const std::vector<const data::Experiment*>& experiments,
                                   const Pipeline& pipeline, const std::vector<std::vector<Eigen::Index>>& identified) {
-  PreparedData prepared = prepare_with(experiments, found.prepared.drive, pipeline);
-  prepared.output_signals = found.prepared.output_signals;
-  take_torque_where_read(prepared, found.terms);
-  for (std::size_t i = 0; i < prepared.records.size(); ++i) {
-    Record& record = prepared.records[i];
-    const Record& original = found.prepared.records[i];
-    record.rows = original.rows;
-    record.torsion_zero_rad = original.torsion_zero_rad;
-    record.inputs.torsion_zero = original.inputs.torsion_zero;
-  }
+  PreparedData prepared = prepare_as(found.prepared, pipeline, experiments, found.terms);
+  for (std::size_t i = 0; i < prepared.records.size(); ++i)
+    take_decisions(prepared.records[i], found.prepared.records[i]);
   std::vector<Linearised> result;
   for (std::size_t b = 0; b < found.data.size(); ++b) {
     RegressionProblem data(prepared, found.data[b].balance());

@@ -257,7 +257,7 @@ MaskCutoff cutoff_for_mask(const PreparedData& prepared, double highest_hz, std:
     for (const double hz : cutoffs) {
       throw_if_cancelled();
       const Pipeline tried = raised(prepared.pipeline, hz);
-      Record again = with_signals(*records[i].experiment, prepared.constants, tried);
+      Record again = with_signals(*records[i].experiment, prepared, tried);
       choose_rows(again, tried);
       for (std::vector<MaskedShare>* shares : {&of_record, &parts[i]})
         for (MaskedShare& s : *shares) s.at_cutoff.push_back(information_left(again, s.direction, s.law_rad_s));
@@ -286,7 +286,7 @@ bool raise_cutoff_for_torsion(PreparedData& prepared, double highest_hz) {
     std::vector<Record> again(large.size());
     in_parallel(large.size(), [&](std::size_t i) {
       throw_if_cancelled();
-      again[i] = with_signals(*large[i], prepared.constants, tried);
+      again[i] = with_signals(*large[i], prepared, tried);
       choose_rows(again[i], tried);
     });
     if (masks_most_torsion(again, tried)) continue;

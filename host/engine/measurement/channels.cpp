@@ -12,9 +12,8 @@ using data::Experiment;
 
 // Of rounding to steps at a random place.
 double step_variance(const std::optional<double>& counts, Axis axis) {
-  if (!counts || !(*counts > 0.0)) return 0.0;
-  const double step = (axis == Axis::rotary ? 2.0 * std::numbers::pi : 1.0) / *counts;
-  return step * step / 12.0;
+  const std::optional<double> step = data::encoder_step(counts, axis);
+  return step ? *step * *step / 12.0 : 0.0;
 }
 double step_variance(const Experiment& e, Column column, Axis axis) {
   if (column == Column::motor_position) return step_variance(e.encoder_counts, axis);

@@ -160,7 +160,8 @@ std::vector<DerivativeComparison> compare_derivatives(const data::Dataset& datas
       std::size_t longest = 0;
       for (const data::Segment& s : e.segments) longest = std::max(longest, s.last - s.first);
       if (longest < kFewestSamples) return;
-      const std::optional<double> step = counts ? std::optional(2.0 * M_PI / *counts) : signals::quantum_of(e[column]);
+      std::optional<double> step = data::encoder_step(counts, dataset.drive.axis.value_or(data::Axis::rotary));
+      if (!step) step = signals::quantum_of(e[column]);
       all.push_back(compared(e, column, velocity, step, options));
     };
     take(options.motor, Column::motor_position, Column::motor_velocity, e.encoder_counts);

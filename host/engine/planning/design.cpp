@@ -165,7 +165,7 @@ class Parameters {
   // Relative standard deviation of each, in percent; none where it is above `kLost`.
   static std::vector<std::optional<double>> percent(const Eigen::MatrixXd& information) {
     constexpr double kLost = 1e4;
-    // An undetermined parameter has a prior of a thousandth of the required information.
+    // A prior far below any information that is required keeps undetermined parameters finite.
     const Eigen::Index n = information.rows();
     const Eigen::MatrixXd covariance = algebra::SymmetricFactor(information + 1e-8 * Eigen::MatrixXd::Identity(n, n))
                                            .solve(Eigen::MatrixXd::Identity(n, n));
@@ -273,7 +273,7 @@ Design d_optimal(const PlanRequest& request) {
       std::vector<std::size_t> more = chosen;
       more.push_back(m);
       const double gain = log_determinant(parameters.information(all, more)) - now;
-      // A motion must reduce the volume of the confidence ellipsoid by at least a factor e; then the gain per time
+      // A motion must raise the determinant of the information by at least a factor e; then the gain per time
       // decides.
       const Motion& motion = rehearsed.motions()[m];
       const double merit = gain > 1.0 ? gain / (duration(motion) + kTrouble_s * motion.operator_effort) : 0.0;

@@ -15,13 +15,18 @@ namespace {
 using estimation::ParameterRef;
 using estimation::Term;
 
+// User-defined effects share their names.
+std::string name_of(const Term& term) {
+  return term.entry->definition ? fmt::format("{} {}", term.entry->name(), term.id) : std::string(term.entry->name());
+}
+
 // Everything that a column depends on except the data: the term's own nonlinear parameters, and those of what may
 // change its inputs.
 std::string label_of(const Terms& terms, ParameterRef ref) {
-  std::string label = fmt::format("{} {}", terms[ref.term].entry->name(), ref.parameter);
+  std::string label = fmt::format("{} {}", name_of(terms[ref.term]), ref.parameter);
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (t != ref.term && terms[t].entry->info->phase == effects::Phase::source) continue;
-    label += fmt::format(" {}", terms[t].entry->name());
+    label += fmt::format(" {}", name_of(terms[t]));
     for (std::size_t p = 0; p < terms[t].values.size(); ++p)
       if (terms[t].entry->parameters[p].kind != effects::Kind::linear)
         label += fmt::format(",{:a}", terms[t].values[p]);
@@ -32,7 +37,7 @@ std::string label_of(const Terms& terms, ParameterRef ref) {
 std::string label_of(const Terms& terms) {
   std::string label;
   for (const Term& t : terms) {
-    label += fmt::format(" {}", t.entry->name());
+    label += fmt::format(" {}", name_of(t));
     for (std::size_t p = 0; p < t.values.size(); ++p) label += fmt::format(",{:a}", t.values[p]);
   }
   return label;

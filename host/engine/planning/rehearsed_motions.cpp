@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/physics/catalogue/user_defined_effect.hpp"
 #include "host/physics/simulation/simulation.hpp"
 
 namespace flexspline::planning {
@@ -76,8 +77,8 @@ double noise_level(const RegressionProblem& data) {
 bool complete(const model::Model& model) {
   for (const model::Effect& e : model.effects)
     for (const model::Parameter& p : e.parameters)
-      if (!p.value &&
-          catalogue::get(e.type).parameters[catalogue::get(e.type).index_of(p.name)].kind != effects::Kind::grid)
+      if (const catalogue::Entry& entry = catalogue::entry_of(e);
+          !p.value && entry.parameters[entry.index_of(p.name)].kind != effects::Kind::grid)
         return false;
   return true;
 }

@@ -35,23 +35,23 @@ const std::size_t* find_balance(const Identification& fitted, Balance own, std::
   return nullptr;
 }
 
-// Of the data that the models are judged on; where these show none, of those that were fitted.
+// Of the data that the models are evaluated on; where these show none, of those that were fitted.
 comparison::NoiseFloor floor_of(const Identification& found, const RegressionProblem& fitted_data,
                                 const std::vector<const data::Experiment*>& fitted,
-                                const RegressionProblem& judged_data,
-                                const std::vector<const data::Experiment*>& judged) {
+                                const RegressionProblem& evaluated_data,
+                                const std::vector<const data::Experiment*>& evaluated) {
   const auto of = [&](const RegressionProblem& data, const std::vector<const data::Experiment*>& experiments) {
     return comparison::pooled(comparison::noise_floors(data, found.terms, experiments, found.model.drive),
                               data.records());
   };
-  const comparison::NoiseFloor floor = of(judged_data, judged);
-  return floor.rmse || &judged_data == &fitted_data ? floor : of(fitted_data, fitted);
+  const comparison::NoiseFloor floor = of(evaluated_data, evaluated);
+  return floor.rmse || &evaluated_data == &fitted_data ? floor : of(fitted_data, fitted);
 }
 
-std::string reversals_are_judged(const Addition& change) {
+std::string reversals_are_evaluated(const Addition& change) {
   return fmt::format(
-      "samples around reversals of the motor are judged, too, as presliding shows there: on the same samples the error "
-      "was {:.4g} {} and is {:.4g} {}; models without such a law are else judged without them",
+      "samples around reversals of the motor count, too, as presliding shows there: on the same samples the error "
+      "was {:.4g} {} and is {:.4g} {}; models without such a law are else evaluated without them",
       change.before.rmse_holdout.value_or(change.before.rmse_fit), change.unit,
       change.after.rmse_holdout.value_or(change.after.rmse_fit), change.unit);
 }
@@ -60,7 +60,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
                         Balance own, std::string effect, std::string action,
                         const estimation::PipelineOptions& stated) {
   Addition result;
-  // Both are judged on the same samples.
+  // Both are evaluated on the same samples.
   estimation::PipelineOptions options = stated;
   options.keep_motor_reversals = estimation::has_presliding(before) || estimation::has_presliding(after);
   result.effect = std::move(effect);
@@ -104,7 +104,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.warnings = extended->warnings;
   if (options.mask && balance == Balance::motor &&
       estimation::has_presliding(before) != estimation::has_presliding(after))
-    result.warnings.push_back(reversals_are_judged(result));
+    result.warnings.push_back(reversals_are_evaluated(result));
   if (action == "add" && result.before.rmse_holdout && *result.after.rmse_holdout >= *result.before.rmse_holdout)
     result.warnings.push_back(fmt::format(
         "the error on held-out data did not decrease: {} does not hold beyond the data that it was fitted on",

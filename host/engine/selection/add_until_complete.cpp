@@ -12,12 +12,19 @@
 namespace flexspline::selection {
 namespace {
 
-// Decrease of chi-square over samples, in units of the noise where that is known: comparable between balances.
-double chi2_drop(const Diagnosis& d) {
-  if (d.candidates.empty()) return 0.0;
-  const Candidate& c = d.candidates.front();
-  const double drop = c.rmse_cv_before * c.rmse_cv_before - c.rmse_cv_after * c.rmse_cv_after;
-  return d.noise_floor && *d.noise_floor > 0.0 ? drop / (*d.noise_floor * *d.noise_floor) : drop;
+// Whether what a round would add takes off a relevant share of the squares that the first effect took off: in units of
+// the noise where both know it, else in N m, on one balance.
+bool is_worth_adding(const Diagnosis& first, const Diagnosis& now) {
+  if (first.candidates.empty() || now.candidates.empty()) return true;
+  const auto knows_noise = [](const Diagnosis& d) { return d.noise_floor && *d.noise_floor > 0.0; };
+  const bool in_noise = knows_noise(first) && knows_noise(now);
+  if (!in_noise && first.candidates.front().balance != now.candidates.front().balance) return true;
+  const auto drop = [&](const Diagnosis& d) {
+    const Candidate& c = d.candidates.front();
+    const double unit = in_noise ? *d.noise_floor : 1.0;
+    return (c.rmse_cv_before * c.rmse_cv_before - c.rmse_cv_after * c.rmse_cv_after) / (unit * unit);
+  };
+  return drop(now) >= kPolicy.worth_adding * drop(first);
 }
 
 std::string label(const NamedEffect& named) {
@@ -61,14 +68,13 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
                                      std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress) {
   StepwiseSelection result;
   result.model = model;
-  std::vector<std::string> added;               // ids
+  std::vector<std::string> added;               // ids of those that likelihood alone named: it may remove them, too
   std::map<std::string, std::string> label_of;  // by id
   for (;;) {
     Diagnosis found = diagnose(dataset, result.model, options);
     bool more = found.verdict == Verdict::missing_effect && result.rounds.size() + 1 < most_rounds;
     const bool above = found.noise_floor && found.base_rmse_own_friction > kPolicy.at_floor * *found.noise_floor;
-    if (more && !above && !result.rounds.empty() &&
-        chi2_drop(found) < kPolicy.worth_adding * chi2_drop(result.rounds.front())) {
+    if (more && !above && !result.rounds.empty() && !is_worth_adding(result.rounds.front(), found)) {
       found.warnings.push_back(
           fmt::format("{} is not added: it takes off less than {:g} % of what the first effect did",
                       label(found.named.front()), 100.0 * kPolicy.worth_adding));
@@ -79,11 +85,14 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
     if (!more) return result;
     if (options.progress) options.progress("adding it");
     result.model = add(dataset, result.model, label(result.rounds.back().named.front()), options.pipeline).model;
-    added.push_back(result.model.effects.back().id);
-    label_of[added.back()] = label(result.rounds.back().named.front());
-    if (added.size() < 2) continue;
     // The newest was just named with the others in the model; only those are tried.
-    const std::vector<std::string> before(added.begin(), added.end() - 1);
+    const std::vector<std::string> before = added;
+    const Diagnosis& last = result.rounds.back();
+    if (!last.candidates.empty() && last.candidates.front().score > kPolicy.named_score) {
+      added.push_back(result.model.effects.back().id);
+      label_of[added.back()] = label(last.named.front());
+    }
+    if (before.empty()) continue;
     const std::string out = least_significant_effect(dataset, result.model, before, options);
     if (out.empty()) continue;
     result.model = remove(dataset, result.model, out, options.pipeline).model;

@@ -65,12 +65,12 @@ void describe_base(const SearchedBalance& chosen, Diagnosis& result) {
   });
 }
 
-void describe_motor_instead(const SearchedBalance& judged, const SearchedBalance& motor, Diagnosis& result) {
+void describe_motor_instead(const SearchedBalance& chosen, const SearchedBalance& motor, Diagnosis& result) {
   if (result.noise_floor)
     result.warnings.push_back(fmt::format(
         "the {} balance has an error of {:.3g} times its noise, which no effect of the catalogue explains; flexspline "
         "compare shows where",
-        catalogue::balance_name(judged.search.data->balance()), result.base_rmse / *result.noise_floor));
+        catalogue::balance_name(chosen.search.data->balance()), result.base_rmse / *result.noise_floor));
   describe_base(motor, result);
   const CrossValidatedFit& fit = motor.search.base;
   result.localised = shares(*motor.search.data, fit, fit.residual_fixed_effects());

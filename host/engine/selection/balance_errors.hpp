@@ -16,7 +16,7 @@ std::vector<LocalisedResidual> shares(const RegressionProblem& data, const Cross
 // The errors of the model without what is named, and the noise.
 void describe_base(const SearchedBalance& chosen, Diagnosis& result);
 
-// The errors of the motor's balance, in place of those of the one that was judged.
-void describe_motor_instead(const SearchedBalance& judged, const SearchedBalance& motor, Diagnosis& result);
+// The errors of the motor's balance, in place of those of the one that was chosen.
+void describe_motor_instead(const SearchedBalance& chosen, const SearchedBalance& motor, Diagnosis& result);
 
 }  // namespace flexspline::selection

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "host/engine/estimation/standard_intervals.hpp"
+#include "host/common/numbers/distributions.hpp"
 #include "host/engine/selection/friction_scaling.hpp"
 #include "host/engine/selection/meta_regression.hpp"
 #include "host/engine/selection/policy.hpp"
@@ -59,10 +59,11 @@ void take_values(const MetaRegression& fit, const Law& law, double p_value, std:
     e.value = natural[e.ref.parameter];
     e.std = e.low = e.high = std::nullopt;
     if (!term.free_linear(e.ref.parameter)) continue;
-    e.std = std::abs(e.value) * fit.coefficient_std / fit.coefficient;
-    const estimation::Interval interval = estimation::interval_95(e.value, *e.std);
-    e.low = interval.low;
-    e.high = interval.high;
+    // Of as few records the variance is uncertain, too (Knapp and Hartung 2003).
+    e.std = std::abs(e.value / fit.t);
+    const double reach = numbers::student_t_quantile(fit.freedom, 0.975) * *e.std;
+    e.low = e.value - reach;
+    e.high = e.value + reach;
   }
   candidate.admit();
   candidate.p_value = p_value;

@@ -250,13 +250,13 @@ void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candida
 
 // Whether the law is nonlinear over a travel that the encoder resolves in few steps: the residual there is the
 // encoder's.
-bool is_smeared(const RegressionProblem& data, const CandidateFit& candidate) {
+bool is_below_resolution(const RegressionProblem& data, const CandidateFit& candidate) {
   const Term& added = candidate.fit.terms.back();
   for (std::size_t p = 0; p < added.values.size(); ++p) {
     if (!added.free_nonlinear(p) || added.entry->parameters[p].limit != effects::Limit::travel) continue;
     for (const RowRange& range : data.records()) {
       const std::optional<double>& quantum = data.prepared().records[range.record].motor_quantum;
-      if (quantum && added.values[p] < kPolicy.smeared_quanta * *quantum) return true;
+      if (quantum && added.values[p] < kPolicy.least_travel_quanta * *quantum) return true;
     }
   }
   return false;
@@ -293,7 +293,7 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
     const auto within = [&](const SelectionPolicy::Same& same) {
       return left <= same.left * least && left - least <= same.share_of_missing * decrease;
     };
-    const bool same = within(is_smeared(*search.data, other) ? kPolicy.same_smeared : kPolicy.same) ||
+    const bool same = within(is_below_resolution(*search.data, other) ? kPolicy.same_below_resolution : kPolicy.same) ||
                       (dozens && within(kPolicy.hardly_more)) ||
                       (left <= kPolicy.hardly_more.left * least &&
                        standard_errors_over(other.fit.left_out, best.fit.left_out) < kPolicy.simpler_standard_errors);
@@ -371,9 +371,14 @@ void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& can
 bool is_negative(const CandidateFit& candidate) {
   const Term& term = candidate.fit.terms.back();
   if (term.entry->info->negative_means.empty()) return false;
-  for (std::size_t p = 0; p < term.values.size(); ++p)
-    if (term.entry->parameters[p].kind == effects::Kind::linear && !(term.values[p] < 0.0)) return false;
-  return true;
+  bool any = false;
+  for (std::size_t p = 0; p < term.values.size(); ++p) {
+    // Data of one direction leave the amplitude of the other one at zero, known.
+    if (term.entry->parameters[p].kind != effects::Kind::linear || term.known[p]) continue;
+    if (!(term.values[p] < 0.0)) return false;
+    any = true;
+  }
+  return any;
 }
 
 bool is_another_law(const CandidateFit& candidate, const RegressionProblem& data) {

@@ -306,11 +306,8 @@ std::vector<CandidateModel> candidate_models(const RegressionProblem& data, cons
   const bool collapsed = !data.prepared().output_signals.torque && data.balance() == estimation::Balance::motor;
   for (const catalogue::Entry& entry : catalogue::all()) {
     if (entry.identified_on() != data.balance() && !collapsed) continue;
-    if (!visible(data, terms, entry) || covered(terms, entry)) continue;
-    if (!entry.info->replaces.empty() && !replaced_in(terms, entry)) continue;
-    if (!entry.info->modulates.empty() && !replaces_it(terms, entry.info->modulates)) continue;
+    if (!may_be_seen(data, terms, entry)) continue;
     const bool ordered = entry.count(Kind::given) > 0;
-    if (!ordered && has(terms, entry.name())) continue;
     // Orders are per turn: a linear axis has turns where its pitch is known.
     const bool turns = data.prepared().rotary || data.prepared().constants.turn_angle_scale != 1.0;
     if (ordered && !turns) continue;

@@ -22,7 +22,7 @@ using estimation::RegressionProblem;
 using estimation::Terms;
 
 // Placebo orders: none is within a fifth of a whole number or of a half.
-constexpr double kPlacebos[] = {1.27, 2.73, 3.29, 4.71, 5.31, 6.73, 8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
+constexpr double kPlacebos[] = {1.27, 2.73, 3.29, 4.71, 5.29, 6.73, 8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
 constexpr double kFewestCycles = 2.0;
 
 // An effect at one value of its nonlinear parameters, with the model that has it, last.

@@ -109,18 +109,19 @@ Eigen::VectorXd residual_of(const RegressionProblem& data, const Regression& reg
 // and that number.
 std::pair<MixedFit, double> fit_with_autocorrelation(const RegressionProblem& data, const Regression& regression,
                                                      const Eigen::VectorXd& keep, CrossValidatedFit& fit) {
-  double tau = data.filter_autocorrelation_time();
+  double next_tau = data.filter_autocorrelation_time(), tau = next_tau;
   MixedFit mixed;
   // The random effects depend on the autocorrelation time of the residual, which depends on the random effects:
   // iterate.
   for (int round = 0; round < 2; ++round) {
+    tau = next_tau;
     mixed = estimation::fit_mixed_model(regression.factors, fit.groups, regression.first_nonlinear, tau);
     fit.theta = mixed.linear.theta.cwiseQuotient(regression.factors.size);
     fit.residual = residual_of(data, regression, fit.theta, mixed);
     fit.root_weights = root_weights_of(data, keep, mixed.effects.variance);
     fit.autocorrelation_time = estimation::autocorrelation_time(data, fit.root_weights.cwiseProduct(fit.residual));
     if (fit.groups.empty() || fit.autocorrelation_time < 1.1 * tau) break;
-    tau = fit.autocorrelation_time;
+    next_tau = fit.autocorrelation_time;
   }
   return {std::move(mixed), tau};
 }
@@ -274,6 +275,9 @@ double fixed_effects_percent_of(const CrossValidatedFit& base, const CrossValida
 
 }  // namespace
 
+// The left-out squares S_i of a record with n_i samples give the deviance n_i/tau ln(S_i/n_i), with the variance of its
+// noise at its maximum of the likelihood: the term S_i/(n_i variance) is one then, and cancels. Below the least
+// variance that counts as noise it is left out as well, so that a fit does not gain by a record that is nearly exact.
 LikelihoodGain likelihood_gain(const CrossValidatedFit& base, const CrossValidatedFit& extended, double added) {
   const double tau = std::max(1.0, std::min(base.autocorrelation_time, extended.autocorrelation_time));
   std::vector<double> after;

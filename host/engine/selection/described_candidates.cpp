@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/standard_intervals.hpp"
@@ -12,6 +13,38 @@
 namespace flexspline::selection {
 
 using estimation::Term;
+
+namespace {
+
+// Error of a nonlinear parameter, in the unit in which users read it: that of its shift in the linearised fit, and the
+// shift itself, by which the search has missed the best value. Nothing where it was not free, or is not determined.
+std::optional<double> nonlinear_std(const CandidateFit& candidate, const RegressionProblem& data,
+                                    const estimation::ParameterRef& ref) {
+  const estimation::Terms& terms = candidate.fit.terms;
+  const auto on_balance = estimation::terms_on(terms, data.balance(), data.prepared().output_signals);
+  const std::vector<estimation::ParameterRef> free = estimation::free_nonlinear_parameters(terms, on_balance);
+  const auto at = std::ranges::find(free, ref);
+  const auto shift = static_cast<Eigen::Index>(candidate.fit.linear.size()) + (at - free.begin());
+  if (at == free.end() || shift >= candidate.fit.std.size()) return std::nullopt;
+  const double std = std::hypot(candidate.fit.std[shift], candidate.fit.theta[shift]);
+  const Term& term = terms[ref.term];
+  std::vector<double> moved = term.values;
+  const double step = 1e-6 * std::max(std::abs(moved[ref.parameter]), 1e-12);
+  moved[ref.parameter] += step;
+  const double slope = (catalogue::natural(*term.entry, moved)[ref.parameter] -
+                        catalogue::natural(*term.entry, term.values)[ref.parameter]) /
+                       step;
+  return std::isfinite(std * slope) ? std::optional(std::abs(std * slope)) : std::nullopt;
+}
+
+}  // namespace
+
+void set_std(estimation::Estimate& e, double std, const effects::ParameterInfo& info) {
+  e.std = std;
+  const estimation::Interval interval = estimation::interval_95(e.value, std);
+  e.low = std::max(interval.low, std::min(info.low, e.value));
+  e.high = std::min(interval.high, std::max(info.high, e.value));
+}
 
 Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& search, data::Axis axis) {
   Candidate c;
@@ -50,6 +83,8 @@ Candidate candidate_of(const CandidateFit& candidate, const BalanceSearch& searc
       const estimation::Interval interval = estimation::interval_95(e.value, *e.std);
       e.low = interval.low;
       e.high = interval.high;
+    } else if (const auto std = nonlinear_std(candidate, *search.data, e.ref)) {
+      set_std(e, *std, term.entry->parameters[p]);
     }
     c.parameters.push_back(std::move(e));
   }

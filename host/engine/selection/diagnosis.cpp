@@ -92,38 +92,34 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
     add_other_balance_evidence(searches, one.search, one.candidates);
     check_orders(searches, one.search, one.candidates);
     check_output_angle_period(one.search, one.candidates);
-    check_by_record(one.search, one.candidates);
-    // Of the torsion each record has a zero of its own, which the held-out ones were not fitted for.
-    if (one.search.data->balance() != estimation::Balance::motor) {
-      check_encoder_errors(one.search, one.candidates);
-      check_worth(one.search, one.candidates);
-      continue;
-    }
-    const HeldOut held_out(dataset, base, estimation::Balance::motor, options.pipeline.ready.get());
-    check_on_held_out(held_out, one.search, one.candidates);
+    check_encoder_errors(one.search, one.candidates);
+    if (one.search.data->balance() == estimation::Balance::motor)
+      one.held_out = std::make_unique<HeldOut>(dataset, base, estimation::Balance::motor, options.pipeline.ready.get());
+    check_first(one);
   }
-  for (SearchedBalance& one : all) discount_evidence(all, one);
+  for (SearchedBalance& one : all)
+    if (discount_evidence(all, one)) check_first(one);
   return all;
 }
 
-// What is judged: which balance, and by which method.
-struct Decision {
-  SearchedBalance* judged = nullptr;
+// The balance that the verdict is about, and the method that names its effects.
+struct ChosenBalance {
+  SearchedBalance* balance = nullptr;
   SearchedBalance* motor = nullptr;          // null: not in the data
-  Method method = Method::likelihood;        // on the judged balance
-  Method motor_method = Method::likelihood;  // on the motor's, whichever is judged
+  Method method = Method::likelihood;        // on that balance
+  Method motor_method = Method::likelihood;  // on the motor's, whichever is chosen
   bool moves = false;                        // any record; else friction cannot show
 };
 
 // The balance whose named effect scores best; where none is named, the one that is highest above its floor. A torsion
 // that is hardly above its noise shows errors of the encoders before anything else, so that its balance comes last.
-SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const Decision& decision,
+SearchedBalance& most_significant(std::vector<SearchedBalance>& all, const ChosenBalance& chosen,
                                   const std::optional<Resampling>& resampling) {
   const auto importance = [&](const SearchedBalance& e) {
     const RegressionProblem& data = *e.search.data;
     const bool is_noisy =
         data.balance() == estimation::Balance::transmission && data.prepared().pipeline.keep_torsion_reversals;
-    const bool is_by_resampling = &e == decision.motor && decision.motor_method == Method::resampling;
+    const bool is_by_resampling = &e == chosen.motor && chosen.motor_method == Method::resampling;
     const bool names_one = is_by_resampling ? names_any(*resampling, e) : e.names_one();
     if (names_one && !e.candidates.empty()) return (is_noisy ? 1e9 : 2e9) + e.candidates.front().score();
     return e.floor.rmse ? e.search.base.rmse() / *e.floor.rmse : 0.0;
@@ -143,67 +139,67 @@ Resampling resample_motor(const data::Dataset& dataset, const estimation::Identi
   return result;
 }
 
-// Chooses the balance to judge, and the method. What halves of the data found goes into the result.
-Decision decide(std::vector<SearchedBalance>& all, const estimation::Identification& base, const data::Dataset& dataset,
-                const Options& options, Diagnosis& result) {
-  Decision decision;
-  decision.moves = std::ranges::any_of(base.prepared.records, [](const estimation::Record& r) { return !r.at_rest; });
+// Chooses the balance and the method. What halves of the data found goes into the result.
+ChosenBalance choose_balance(std::vector<SearchedBalance>& all, const estimation::Identification& base,
+                             const data::Dataset& dataset, const Options& options, Diagnosis& result) {
+  ChosenBalance chosen;
+  chosen.moves = std::ranges::any_of(base.prepared.records, [](const estimation::Record& r) { return !r.at_rest; });
   for (SearchedBalance& e : all)
-    if (e.search.data->balance() == estimation::Balance::motor) decision.motor = &e;
+    if (e.search.data->balance() == estimation::Balance::motor) chosen.motor = &e;
   bool motor_names_one = false;
-  if (decision.motor) {
-    motor_names_one = decision.motor->names_one();
-    if (decision.moves) {
+  if (chosen.motor) {
+    motor_names_one = chosen.motor->names_one();
+    if (chosen.moves) {
       report(options, "choosing effects on halves of the data");
-      result.resampling = resample_motor(dataset, base, *decision.motor);
-      decision.motor_method = deciding_method(*result.resampling, *decision.motor);
-      if (decision.motor_method == Method::resampling) motor_names_one = names_any(*result.resampling, *decision.motor);
+      result.resampling = resample_motor(dataset, base, *chosen.motor);
+      chosen.motor_method = deciding_method(*result.resampling, *chosen.motor);
+      if (chosen.motor_method == Method::resampling) motor_names_one = names_any(*result.resampling, *chosen.motor);
     }
   }
   const bool is_motor_first = base.prepared.pipeline.keep_torsion_reversals && motor_names_one;
-  decision.judged = is_motor_first ? decision.motor : &most_significant(all, decision, result.resampling);
-  if (decision.judged == decision.motor) decision.method = decision.motor_method;
-  if (result.resampling) result.resampling->decides = decision.method == Method::resampling;
-  return decision;
+  chosen.balance = is_motor_first ? chosen.motor : &most_significant(all, chosen, result.resampling);
+  if (chosen.balance == chosen.motor) chosen.method = chosen.motor_method;
+  if (result.resampling) result.resampling->decides = chosen.method == Method::resampling;
+  return chosen;
 }
 
-// Names what the judged balance lacks. Returns the candidate that likelihood named; null: it named none.
-const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const Decision& decision, const Options& options,
+// Names what the chosen balance lacks. Returns the candidate that likelihood named; null: it named none.
+const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const ChosenBalance& chosen, const Options& options,
                                  data::Axis axis, Diagnosis& result) {
-  SearchedBalance& judged = *decision.judged;
-  const bool by_resampling = decision.method == Method::resampling;
+  SearchedBalance& balance = *chosen.balance;
+  const bool by_resampling = chosen.method == Method::resampling;
   std::string alias;
-  if (judged.names_one() && !by_resampling) {
+  if (balance.names_one() && !by_resampling) {
     report(options, "checking what else could explain it");
-    alias = choose_named(judged);
+    alias = choose_named(balance);
   }
-  const bool by_likelihood = judged.names_one() && !by_resampling;
-  describe_base(judged, result);
+  const bool by_likelihood = balance.names_one() && !by_resampling;
+  describe_base(balance, result);
   // Where nothing is missing, friction that differs between runs is not a structure to search for.
-  const CrossValidatedFit& fit = judged.search.base;
+  const CrossValidatedFit& fit = balance.search.base;
   result.localised =
-      shares(*judged.search.data, fit, by_likelihood || by_resampling ? fit.residual_fixed_effects() : fit.residual);
+      shares(*balance.search.data, fit, by_likelihood || by_resampling ? fit.residual_fixed_effects() : fit.residual);
   list_candidates(all, axis, result);
-  if (by_resampling) name_stable(judged, result);
-  if (by_likelihood) name_by_likelihood(judged, alias, result);
+  if (by_resampling) name_stable(balance, result);
+  if (by_likelihood) name_by_likelihood(balance, alias, result);
   take_back_insignificant(result);
-  return by_likelihood ? &judged.candidates.front() : nullptr;
+  return by_likelihood ? &balance.candidates.front() : nullptr;
 }
 
 // The delay of the effort that halves of the data agree on, and what to do about it.
-void assess_delay(const Decision& decision, const estimation::PreparedData& prepared, Diagnosis& result) {
-  if (decision.method == Method::resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
+void assess_delay(const ChosenBalance& chosen, const estimation::PreparedData& prepared, Diagnosis& result) {
+  if (chosen.method == Method::resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
   if (result.delay_s) result.delay_advice = delay_advice(*result.delay_s, prepared);
 }
 
-// Friction differs between records on the motor's balance, whichever one was judged.
+// Friction differs between records on the motor's balance, whichever one was chosen.
 void look_between_records(const estimation::Identification& base, const estimation::Identification& all_records,
-                          const Decision& decision, Diagnosis& result) {
-  const SearchedBalance& motor = *decision.motor;
-  const bool is_other = decision.judged != decision.motor;
+                          const ChosenBalance& chosen, Diagnosis& result) {
+  const SearchedBalance& motor = *chosen.motor;
+  const bool is_other = chosen.balance != chosen.motor;
   if (is_other) add_drifts(motor, motor.search.base, result);
   name_between_records(base, all_records, motor, result);
-  if (is_other && !result.named.empty()) describe_motor_instead(*decision.judged, motor, result);
+  if (is_other && !result.named.empty()) describe_motor_instead(*chosen.balance, motor, result);
 }
 
 // Whether the data could show anything at all.
@@ -228,7 +224,16 @@ void list_untried(const estimation::PreparedData& prepared, Diagnosis& result) {
       names);
 }
 
-// At the cut-off and the mask of the options: fits the model, judges the balance where most is missing, names what it
+// The steps depend on each other through `result`:
+//   name_effects                   writes verdict, balance, errors, candidates, named, possible, partial
+//   take_back_unconfirmed_scaling  reads named and verdict; takes names back
+//   explain_named                  reads named; writes evidence and size of their candidates
+//   assess_remainder               reads named; writes verdict (where nothing is named), delay, drift, recovered share
+//   check_unknown_structure        reads named; may replace verdict and names, or set partial
+//   look_between_records           reads named; may name what differs between records, and the motor's balance with it
+//   name_on_other_balances         reads named and verdict; appends names of the other balances
+//   refit_presliding, take_back_insignificant   change values and names by what was found before
+// At the cut-off and the mask of the options: fits the model, chooses the balance where most is missing, names what it
 // lacks, tests the names against what differs between records, and says what is left.
 Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, const Options& options) {
   Diagnosis result;
@@ -238,33 +243,36 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   result.warnings = base->warnings;
   result.parameter_trends = parameter_trends(*base);
   estimation::take_modelled_current(base->prepared, base->terms);
+  // Columns that were formed before are of the measured current.
+  if (std::ranges::any_of(base->terms, estimation::reads_modelled_current))
+    for (RegressionProblem& data : base->data) data = RegressionProblem(base->prepared, data.balance());
   std::vector<SearchedBalance> all = search_balances(*base, dataset, options, result);
-  const Decision decision = decide(all, *base, dataset, options, result);
-  SearchedBalance& judged = *decision.judged;
-  const bool by_resampling = decision.method == Method::resampling;
-  const CandidateFit* likeliest = name_effects(all, decision, options, model.drive.axis, result);
+  const ChosenBalance chosen = choose_balance(all, *base, dataset, options, result);
+  SearchedBalance& balance = *chosen.balance;
+  const bool by_resampling = chosen.method == Method::resampling;
+  const CandidateFit* likeliest = name_effects(all, chosen, options, model.drive.axis, result);
 
   const bool tests_between_records =
-      decision.motor_method == Method::resampling && (by_resampling || result.named.empty());
+      chosen.motor_method == Method::resampling && (by_resampling || result.named.empty());
   const std::unique_ptr<AllRecords> all_records =
-      tests_between_records ? fit_all_records(*decision.motor, dataset, model, options.pipeline) : nullptr;
+      tests_between_records ? fit_all_records(*chosen.motor, dataset, model, options.pipeline) : nullptr;
   const estimation::Identification& of_all_records = all_records ? *all_records->fitted : *base;
-  if (by_resampling) take_back_unconfirmed_scaling(of_all_records, judged, result);
-  if (!result.named.empty()) explain_named(judged.search, judged.candidates, model.drive, result);
+  if (by_resampling) take_back_unconfirmed_scaling(of_all_records, balance, result);
+  if (!result.named.empty()) explain_named(balance.search, balance.candidates, model.drive, result);
 
-  assess_remainder(judged, result);
-  assess_delay(decision, base->prepared, result);
+  assess_remainder(balance, result);
+  assess_delay(chosen, base->prepared, result);
   if (!by_resampling || result.named.empty()) {
     report(options, "looking for what no effect explains");
-    check_unknown_structure(judged.search, likeliest, result);
+    check_unknown_structure(balance.search, likeliest, result);
   }
-  if (tests_between_records) look_between_records(*base, of_all_records, decision, result);
-  name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *decision.motor : judged, model.drive,
+  if (tests_between_records) look_between_records(*base, of_all_records, chosen, result);
+  name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *chosen.motor : balance, model.drive,
                          result);
-  refit_presliding(dataset, model, options, decision.motor, result);
+  refit_presliding(dataset, model, options, chosen.motor, result);
   take_back_insignificant(result);
   explain_orders(base->model.drive, result);
-  assess_excitation(decision.moves, result);
+  assess_excitation(chosen.moves, result);
   list_untried(base->prepared, result);
   return result;
 }

@@ -63,7 +63,7 @@ struct Candidate {
   std::string effect;
   std::optional<double> order;
   estimation::Balance balance = estimation::Balance::motor;
-  double score = 0.0;  // decrease of cross-validated chi-square over the autocorrelation time, less k ln(n_eff)
+  double score = 0.0;                  // decrease of the cross-validated deviance, less k ln(n_eff)
   double other_balance_score = 0.0;    // on the other balances that the effect acts on, with the same parameters
   double chi2_decrease_percent = 0.0;  // cross-validated
   double rmse_cv_before = 0.0;
@@ -123,6 +123,9 @@ struct Resampling {
     bool is_strongly_confirmed() const;
     // It falls by more than what stays, so that nothing else can be the larger part of what is missing.
     bool is_most_of_held_out_error() const;
+    // It is in no catalogue, and the data show it for certain: held-out experiments confirm it by the share that a law
+    // has to take off; without any, nearly all subsamples chose it.
+    bool is_unknown_structure() const;
   };
   // How often a term was chosen, or was nearly as good as what was; zero for one that never was.
   struct Support {
@@ -147,8 +150,7 @@ struct Resampling {
   std::vector<NamedEffect> found_group(const NamedEffect& name) const;
   // Whether these data could show an effect to resampling at all: what corrects the effort needs peaks of it.
   bool is_visible(std::string_view effect) const;
-  bool decides =
-      false;  // the model's error is no noise even with the likeliest effect, so that likelihood alone does not count
+  bool decides = false;  // about the verdict; else likelihood does
 };
 
 // Where a law is named by how friction differs between records.
@@ -222,7 +224,7 @@ struct Diagnosis {
   std::vector<Disturbance> disturbances;
   std::vector<std::string> warnings;
   std::optional<Resampling> resampling;     // of the motor's balance
-  std::vector<PossibleEffect> possible;     // where resampling decides: not named, and not ruled out
+  std::vector<PossibleEffect> possible;     // not named, and not ruled out
   bool partial = false;                     // more is missing than what is named
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
   std::optional<BetweenRecords> between_records;
@@ -238,9 +240,10 @@ struct Options {
   std::function<void(std::string_view)> progress;  // called at each stage; may be empty
 };
 
-// The method is in METHOD.md. Uses experiments of role fit. The model need not have values:
-// all free parameters are estimated. A verdict must not depend on a cut-off or a mask, so it is made at those that are
-// found in the data; where `options` state others, at_stated_setting says what these would give alone.
+// The method is in METHOD.md. Experiments of role fit are fitted on; held-out ones decide about names. The model need
+// not have values: all free parameters are estimated. A verdict must not depend on a cut-off or a mask, so it is made
+// at those that are found in the data; where `options` state others, at_stated_setting says what these would give
+// alone.
 Diagnosis diagnose(const data::Dataset& dataset, const model::Model& model, const Options& options);
 
 }  // namespace flexspline::selection

@@ -115,7 +115,7 @@ void check_encoder_errors(const BalanceSearch& own, std::vector<CandidateFit>& c
     const auto at = std::find_if(again.begin(), again.end(), [&](const CandidateFit& a) { return is_same(a, t); });
     if (at != again.end() && is_worth_a_term(behind, *at)) continue;
     t.admissible = false;
-    t.why_not = "a zero or an eccentric disc of an encoder, some arc seconds, explains it as well";
+    t.why_not = "a zero or an eccentric disc of an encoder explains it as well";
   }
   sort_candidates(own, candidates);
   if (candidates.empty() || again.empty() || !is_checked(candidates.front()) || !is_worth_a_term(behind, again.front()))

@@ -231,7 +231,7 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
   const double before = at.now().validation_squares;
   result.before = result.after = before;
   if (before / validation.rows > policy.max_validation_to_training * at.now().training_squares / fit.rows) {
-    result.abstains = result.extrapolates = true;
+    result.abstains = true;
     return result;
   }
   at.set_floor(std::min(noise.variance * validation.rows, 0.999 * before));

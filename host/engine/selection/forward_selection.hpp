@@ -32,7 +32,6 @@ struct Noise {
 
 struct SelectionPath {
   bool abstains = false;
-  bool extrapolates = false;         // the model alone does not carry over from one half to the other
   double before = 0.0, after = 0.0;  // squares of the validation half, model alone and with all steps
   std::vector<SelectionStep> steps;
 };

@@ -60,8 +60,10 @@ void add_angle_curves(TableBuilder& builder) {
     });
   };
   for (const bool friction : {false, true})
-    add_generic(builder, fmt::format("{} over the output angle", friction ? "friction" : "torque"), friction,
-                [&](const DirectedData& d) {
+    add_generic(builder,
+                fmt::format("{} over the output {}", friction ? "friction" : "torque",
+                            builder.sign.prepared.rotary ? "angle" : "position"),
+                friction, [&](const DirectedData& d) {
                   std::vector<Eigen::VectorXd> curve;
                   for (int degree = 1; degree <= kCurveDegree; ++degree)
                     curve.push_back(chebyshev(d, degree, friction));

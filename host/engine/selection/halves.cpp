@@ -81,8 +81,9 @@ ProductsAlong products_along(const Setting& setting, const Eigen::MatrixXd& choi
   return along;
 }
 
-// The products of half the data: what is taken, or what is left of all. Friction that differs is eliminated from each
-// record alone, by a matrix of low rank.
+// The products X'X of half the data: of the blocks that a choice takes, or of the others. Friction that differs is
+// eliminated from each record i alone, which takes off a matrix of low rank: X'X - sum_i F_i F_i', with the factor F_i
+// of eliminated_factor().
 class HalfProducts {
  public:
   HalfProducts(const Setting& setting, const Eigen::MatrixXd& choices, const FrictionRandomEffects& differences,
@@ -95,9 +96,9 @@ class HalfProducts {
   }
 
   // `sums`: products of all columns by choice of blocks, in the last column those of all blocks.
-  Eigen::MatrixXd of(const Eigen::MatrixXd& sums, Eigen::Index choice, bool taken) const {
+  Eigen::MatrixXd of(const Eigen::MatrixXd& sums, Eigen::Index choice, bool first_half) const {
     const auto half = [&](const Eigen::MatrixXd& by_choice) -> Eigen::VectorXd {
-      if (taken) return by_choice.col(choice);
+      if (first_half) return by_choice.col(choice);
       return by_choice.rightCols<1>() - by_choice.col(choice);
     };
     Eigen::MatrixXd products = products_of(setting_, half(sums), direction_);

@@ -47,10 +47,9 @@ double most_growth(const CrossValidatedFit& base, const CrossValidatedFit& with)
 }  // namespace
 
 void check_on_held_out(const HeldOut& held_out, const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
-  constexpr std::size_t kMostRefused = 8;
   if (!held_out.data) return;
   const double before = held_out.rmse(search.base.terms);
-  for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
+  while (!candidates.empty() && passes(candidates.front())) {
     CandidateFit& first = candidates.front();
     const double ratio = held_out.rmse(first.fit.terms) / std::max(before, 1e-300);
     first.held_out_ratio = ratio;

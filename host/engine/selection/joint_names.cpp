@@ -12,7 +12,7 @@ namespace flexspline::selection {
 namespace {
 
 // Null: likelihood does not judge it.
-const CandidateFit* judged_candidate(const SearchedBalance& motor, const NamedEffect& name) {
+const CandidateFit* candidate_by_likelihood(const SearchedBalance& motor, const NamedEffect& name) {
   const CandidateFit* candidate = candidate_named(motor, name);
   return candidate && candidate->model.entry->is_presliding() ? nullptr : candidate;
 }
@@ -46,11 +46,11 @@ LikelihoodGain gain_together(const BalanceSearch& with_others, const CandidateFi
 // likelihood does not judge it, or judges no other one.
 std::optional<double> score_with_others(const SearchedBalance& motor, const std::vector<NamedEffect>& names,
                                         const NamedEffect& name) {
-  if (!judged_candidate(motor, name)) return std::nullopt;
+  if (!candidate_by_likelihood(motor, name)) return std::nullopt;
   Terms terms = motor.search.base.terms;
   const std::size_t before = terms.size();
   for (const NamedEffect& other : names)
-    if (const CandidateFit* c = judged_candidate(motor, other); c && other != name)
+    if (const CandidateFit* c = candidate_by_likelihood(motor, other); c && other != name)
       terms.push_back(c->fit.terms.back());
   if (terms.size() == before) return std::nullopt;
   BalanceSearch with_others{motor.search.data, motor.search.keep, {}, motor.search.floor};
@@ -79,10 +79,10 @@ bool may_replace(const Resampling& resampling, const CandidateFit& likeliest) {
 
 // Whether halves cannot judge the likeliest effect, which looks like the one that it makes needless.
 bool is_indistinct(const Resampling& resampling, const CandidateFit& likeliest, const NamedEffect& needless) {
-  const bool is_judged = support_of(resampling, likeliest) && resampling.is_visible(likeliest.model.entry->name());
+  const bool is_covered = support_of(resampling, likeliest) && resampling.is_visible(likeliest.model.entry->name());
   const catalogue::Entry& entry = catalogue::get(needless.effect);
-  return !is_judged && (catalogue::names_contain(likeliest.model.entry->info->confused_with, entry.name()) ||
-                        catalogue::names_contain(entry.info->confused_with, likeliest.model.entry->name()));
+  return !is_covered && (catalogue::names_contain(likeliest.model.entry->info->confused_with, entry.name()) ||
+                         catalogue::names_contain(entry.info->confused_with, likeliest.model.entry->name()));
 }
 
 }  // namespace
@@ -96,7 +96,7 @@ JointNames eliminate_backward(const Resampling& resampling, const SearchedBalanc
     double least = 0.0;
     auto worst = names.end();
     for (auto name = names.begin(); name != names.end(); ++name) {
-      const CandidateFit* alone = judged_candidate(motor, *name);
+      const CandidateFit* alone = candidate_by_likelihood(motor, *name);
       if (!alone || alone->gain.score <= kPolicy.named_score) continue;
       const std::optional<double> score = score_with_others(motor, names, *name);
       if (!score || *score > least) continue;
@@ -114,6 +114,8 @@ JointNames eliminate_backward(const Resampling& resampling, const SearchedBalanc
       joint.names = {std::move(*like_it), *other};
       joint.eliminated.erase(like_it);
       joint.is_group = true;
+      std::erase(names, *other);
+      joint.more = std::move(names);
       return joint;
     }
     std::erase(names, *other);

@@ -76,8 +76,12 @@ MetaRegression against(const Fitted& without, const RecordParameters& records, c
   // The maximum of the likelihood takes the variances between records from as many squares as there are records.
   if (with.freedom > 0.0 && with.coefficient_std > 0.0)
     result.t = with.coefficient / (with.coefficient_std * std::sqrt(std::max(1.0, with.squares / with.freedom)));
-  const Eigen::ArrayXd before = without.between.array().max(1e-300);
-  result.explained_share = std::max(0.0, 1.0 - (with.between.transpose().array() / before).mean());
+  // Of the parameters that differ between records.
+  const Eigen::ArrayXd before = without.between.array(), after = with.between.transpose().array();
+  const double differing = (before > 0.0).cast<double>().sum();
+  if (differing > 0.0)
+    result.explained_share =
+        std::max(0.0, (before > 0.0).select(1.0 - after / before.max(1e-300), 0.0).sum() / differing);
   result.mean = with.mean.transpose();
   return result;
 }

@@ -128,12 +128,12 @@ bool name_jointly(const SearchedBalance& motor, Diagnosis& result) {
   std::erase_if(result.possible, [&](const PossibleEffect& p) {
     return p.group.size() == 1 && contains(result.named, p.group.front());
   });
-  for (NamedEffect& name : joint.eliminated) {
-    PossibleEffect eliminated;
-    eliminated.group.push_back(std::move(name));
-    eliminated.why_not = "once the other effects are in the model, left-out data gain nothing by it";
-    result.possible.push_back(std::move(eliminated));
-  }
+  const auto list = [&](std::vector<NamedEffect>& names, const char* why_not) {
+    for (NamedEffect& name : names) result.possible.push_back({{std::move(name)}, why_not, std::nullopt, std::nullopt});
+  };
+  list(joint.eliminated, "with the named effect in the model, left-out data gain nothing by it");
+  list(joint.more,
+       "it is missing besides what cannot be distinguished; add what is missing of that and diagnose again");
   return joint.is_group;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/engine/selection/balance_errors.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
 #include "host/engine/selection/confounding.hpp"
 #include "host/engine/selection/deciding_method.hpp"
@@ -23,9 +24,18 @@ std::string choose_named(SearchedBalance& chosen) {
       return t.model.entry == instead->model.entry && t.model.order == instead->model.order;
     };
     // Held-out data and other checks may have refused it already.
-    if (std::none_of(list.begin(), list.end(), [&](const CandidateFit& t) { return is_it(t) && !t.admissible; })) {
-      std::erase_if(list, is_it);
+    const auto searched = std::ranges::find_if(list, is_it);
+    if (searched == list.end() || searched->admissible) {
+      if (searched != list.end()) {
+        instead->other_balance_score = searched->other_balance_score;
+        instead->other_balance_percent = searched->other_balance_percent;
+        instead->at_floor_on_others = searched->at_floor_on_others;
+        if (instead->note.empty()) instead->note = searched->note;
+        list.erase(searched);
+      }
       list.insert(list.begin(), std::move(*instead));
+      check_first(chosen);
+      if (!chosen.names_one()) return {};
     }
   }
   const CandidateFit& first = list.front();
@@ -111,7 +121,7 @@ StableNames own_names(SearchedBalance& balance, const Diagnosis& result) {
     return stable_names(*result.resampling, balance);
   if (!balance.names_one()) return {};
   const std::string alias = choose_named(balance);
-  if (balance.candidates.front().gain.chi2_percent < 100.0 * kPolicy.line_share) return {};
+  if (!balance.names_one() || balance.candidates.front().gain.chi2_percent < 100.0 * kPolicy.line_share) return {};
   const std::vector<NamedEffect> names = likely_names(balance, alias, std::nullopt);
   return {names, names.size() > 1};
 }
@@ -166,6 +176,7 @@ void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBal
       for (Candidate& c : result.candidates)
         if (name_of(c) == n) c.admit();
     }
+    if (result.named == names) describe_base(balance, result);  // what the other balance named was taken back
     explain_named(balance.search, balance.candidates, drive, result);
   }
   put_first(result);

@@ -67,8 +67,8 @@ bool is_below_share_of_a_term(const Resampling::FoundTerm& found) {
 }
 
 std::string how_held_out_falls(const Resampling::FoundTerm& found) {
-  return fmt::format("the error on experiments that are held out falls by {:.1f} % only",
-                     100.0 * (1.0 - *found.held_out_ratio));
+  return fmt::format("the squared error on experiments that are held out falls by {:.1f} % only",
+                     100.0 * (1.0 - *found.held_out_ratio * *found.held_out_ratio));
 }
 
 constexpr std::string_view kNearNoise =

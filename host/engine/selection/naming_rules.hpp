@@ -37,7 +37,7 @@ std::string held_out_rise(const Resampling::FoundTerm& found);
 
 // Whether all data contradict what their halves chose: with it, the likelihood of the data left out of the fit falls
 // significantly, and their error rises. The halves are parts of the same motions, and agree in what those have in
-// common; then the held-out error has to fall by as much as an effect that matters. Presliding is not judged, as the
+// common; then the held-out error has to fall by as much as an effect that matters. Presliding is not tried, as the
 // likelihood leaves out reversals.
 bool is_contradicted(const Resampling::FoundTerm& found, const SearchedBalance& motor);
 

@@ -157,22 +157,23 @@ bool is_confused_with(const CandidateModel& candidate, const catalogue::Entry& n
                                       catalogue::names_contain(named.info->confused_with, candidate.entry->name()));
 }
 
-void discount_evidence(const std::vector<SearchedBalance>& all, SearchedBalance& own) {
+bool discount_evidence(const std::vector<SearchedBalance>& all, SearchedBalance& own) {
   bool any = false;
   for (CandidateFit& candidate : own.candidates) {
     // A wave has a phase, too, which an effect of the other balance would not have by chance.
     if (candidate.model.order || candidate.other_balance_score <= kPolicy.named_score) continue;
-    double rival = 0.0;
+    double similar = 0.0;
     for (const SearchedBalance& other : all)
       if (acts_on(*candidate.model.entry, own.search, other.search))
         for (const CandidateFit& t : other.candidates)
           if (passes(t) && is_confused_with(candidate.model, *t.model.entry, t.model.order))
-            rival = std::max(rival, t.gain.score);
-    if (rival <= candidate.other_balance_score + kPolicy.confounded_margin) continue;
+            similar = std::max(similar, t.gain.score);
+    if (similar <= candidate.other_balance_score + kPolicy.confounded_margin) continue;
     candidate.other_balance_score = 0.0;
     any = true;
   }
   if (any) sort_candidates(own.search, own.candidates);
+  return any;
 }
 
 }  // namespace flexspline::selection

@@ -11,7 +11,7 @@ namespace flexspline::selection {
 std::vector<BalanceSearch*> other_balances_of(const std::vector<BalanceSearch*>& all, const BalanceSearch& own,
                                               const CandidateFit& candidate);
 
-// For each candidate of `own` above the limit, cross-validates its effect on every other balance that it acts on, with
+// For each admissible candidate of `own`, cross-validates its effect on every other balance that it acts on, with
 // parameters on which both agree: a ripple of the torque sensor and an error of the gear have the same effect where the
 // spring twists, but only the gear's error turns the motor. The scores go to `CandidateFit::other_balance_score`, what
 // is refuted there is refused, and the candidates are put in order again. `all` holds the searches of every balance,
@@ -25,6 +25,7 @@ bool is_confused_with(const CandidateModel& candidate, const catalogue::Entry& n
 
 // Takes the evidence of other balances off a candidate of `own` without an order where a candidate of those, with which
 // it may be confused, explains more there: an offset of the motor's current is no offset of the torque's sensor.
-void discount_evidence(const std::vector<SearchedBalance>& all, SearchedBalance& own);
+// Returns whether there was one; the list stays best first.
+bool discount_evidence(const std::vector<SearchedBalance>& all, SearchedBalance& own);
 
 }  // namespace flexspline::selection

@@ -1,4 +1,5 @@
-// Every threshold of the diagnosis in one place, with its unit and its source. Steps are those of METHOD.md.
+// Thresholds of the diagnosis that decide about names, in one place, with its unit and its source. Steps are those of
+// METHOD.md.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +41,8 @@ struct SelectionPolicy {
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.
   double line_share = 0.05;  // a linear term
   double law_share = 0.10;   // a term with nonlinear parameters
-  // Smallest log-likelihood gain: chance alone gives a term with two parameters 6 in one of 20 cases.
+  // Smallest decrease of the deviance (twice the log-likelihood): chance alone gives a term with two parameters 6 in
+  // one of 20 cases.
   double least_gain = 6.0;
   // A subsample without that share of its squares above the noise abstains.
   double least_excess = 0.03;
@@ -146,13 +148,13 @@ struct SelectionPolicy {
     double left, share_of_missing;
   };
   Same same{2.25, 0.001};
-  Same same_smeared{2.89, 0.01};
+  Same same_below_resolution{2.89, 0.01};
   Same hardly_more{1.21, 0.005};
   // Or its error is larger by less than one standard error of the parts left out (Breiman, Friedman, Olshen and Stone
   // 1984: the one-standard-error rule): where something else is missing, too, the parts disagree which law is better.
   double simpler_standard_errors = 1.0;
-  double smeared_quanta = 20.0;   // travels of fewer encoder steps are smeared (the same drives)
-  double many_parameters = 12.0;  // a law of so many more is confounded with any
+  double least_travel_quanta = 20.0;  // travels of fewer encoder steps are not resolved (the same drives)
+  double many_parameters = 12.0;      // a law of so many more is confounded with any
 
   // Orders per motor turn.
   int highest_order = 24;            // of gears and motors: the wave generator's, slots, poles and bearings

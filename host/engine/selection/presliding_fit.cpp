@@ -1,13 +1,17 @@
 #include "host/engine/selection/presliding_fit.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "host/common/numbers/quantile.hpp"
 #include "host/engine/selection/confounding.hpp"
 #include "host/engine/selection/described_candidates.hpp"
 #include "host/engine/selection/effect_names.hpp"
 
 namespace flexspline::selection {
 namespace {
+
+using estimation::Estimate;
 
 bool is_presliding(const NamedEffect& name) {
   return catalogue::get(name.effect).is_presliding();
@@ -22,6 +26,30 @@ Terms with_others(Terms terms, const SearchedBalance& motor, const std::vector<N
     terms.push_back(other->fit.terms.back());
   }
   return terms;
+}
+
+// Travel of the motor between two samples at reversals, median, rad: what is shorter is not seen. Zero without
+// reversals.
+double travel_between_samples(const RegressionProblem& data) {
+  std::vector<double> travels;
+  for (const estimation::RowRange& range : data.records()) {
+    const estimation::Record& r = data.prepared().records[range.record];
+    if (r.at_rest || !r.has_motor_motion) continue;
+    for (const data::Segment& s : r.segments)
+      for (std::size_t k = s.first + 1; k + 1 < s.last; ++k)
+        if (r.inputs.velocity_at(k) * r.inputs.velocity_at(k - 1) < 0.0)
+          travels.push_back(std::abs(r.inputs.angle_at(k + 1) - r.inputs.angle_at(k)));
+  }
+  return travels.empty() ? 0.0 : numbers::upper_median(std::move(travels));
+}
+
+// A travel is known no better than that between two samples.
+void count_sampling(const RegressionProblem& data, Candidate& candidate) {
+  const double unseen = travel_between_samples(data);
+  for (Estimate& e : candidate.parameters) {
+    const effects::ParameterInfo& info = catalogue::get(candidate.effect).parameters[e.ref.parameter];
+    if (info.limit == effects::Limit::travel && e.std) set_std(e, std::hypot(*e.std, unseen), info);
+  }
 }
 
 }  // namespace
@@ -47,6 +75,7 @@ void refit_presliding(const data::Dataset& dataset, const model::Model& model, c
   });
   if (laws.empty()) return;
   Candidate of_all = candidate_of(laws.front(), search, model.drive.axis);
+  count_sampling(*data, of_all);
   of_all.admit();
   of_all.cannot_distinguish = listed->cannot_distinguish;
   of_all.confounding_reasons = listed->confounding_reasons;

@@ -104,8 +104,7 @@ bool is_within_floor_of_few_records(const BalanceSearch& search) {
 }
 
 void check_by_record(const BalanceSearch& search, std::vector<CandidateFit>& candidates) {
-  constexpr std::size_t kMostRefused = 8;
-  for (std::size_t k = 0; k < kMostRefused && !candidates.empty() && passes(candidates.front()); ++k) {
+  while (!candidates.empty() && passes(candidates.front())) {
     CandidateFit& first = candidates.front();
     first.why_not = why_not(search, first);
     if (first.why_not.empty()) return;

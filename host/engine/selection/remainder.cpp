@@ -51,8 +51,19 @@ void add_drifts(const SearchedBalance& balance, const CrossValidatedFit& fit, Di
   }
 }
 
+namespace {
+
+// Whether halves of the data decide, and found a structure that is in no catalogue.
+bool halves_show_unknown_structure(const Diagnosis& result) {
+  return result.resampling && result.resampling->decides &&
+         std::ranges::any_of(result.resampling->found, &Resampling::FoundTerm::is_unknown_structure);
+}
+
+}  // namespace
+
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
-  const CrossValidatedFit& after = result.named.empty() ? chosen.search.base : chosen.candidates.front().fit;
+  const CandidateFit* named = result.named.empty() ? nullptr : candidate_named(chosen, result.named.front());
+  const CrossValidatedFit& after = named ? named->fit : chosen.search.base;
   // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
   // says how large it is.
   const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
@@ -80,9 +91,10 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   if (!result.named.empty()) return;
   if (at_floor)
     result.verdict = Verdict::at_noise_floor;
+  else if ((result.noise_floor && !remaining.empty()) || halves_show_unknown_structure(result))
+    result.verdict = Verdict::unknown_structure;
   else
-    result.verdict =
-        result.noise_floor && !remaining.empty() ? Verdict::unknown_structure : Verdict::nothing_significant;
+    result.verdict = Verdict::nothing_significant;
 }
 
 }  // namespace flexspline::selection

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/engine/selection/decision.hpp"
+#include "host/engine/selection/frequent_groups.hpp"
 #include "host/engine/selection/policy.hpp"
 #include "host/engine/selection/stability_selection.hpp"
 
@@ -65,7 +65,7 @@ Resampling::FoundTerm found_term(const FoundTerm& found, std::optional<double> h
 
 // What the subsamples chose, with its error on experiments that are held out.
 void find_terms(const StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
-  const std::vector<FoundTerm> decided = decide(selection.result(), kPolicy);
+  const std::vector<FoundTerm> decided = frequent_groups(selection.result(), kPolicy);
   const std::vector<double> held_out = selection.held_out_ratios(first_names(decided));
   for (std::size_t i = 0; i < decided.size(); ++i)
     result.found.push_back(found_term(decided[i], held_out.empty() ? std::nullopt : std::optional(held_out[i]), terms));
@@ -106,7 +106,7 @@ void leave_out_sticking(StabilitySelection& selection, const estimation::Terms& 
 void find_instead_of_refused(StabilitySelection& selection, const estimation::Terms& terms, Resampling& result) {
   std::vector<Resampling::FoundTerm> refused;
   std::vector<std::string> names;
-  const std::vector<FoundTerm> decided = decide(selection.result(), kPolicy);
+  const std::vector<FoundTerm> decided = frequent_groups(selection.result(), kPolicy);
   for (std::size_t i = 0; i < decided.size(); ++i) {
     if (!result.found[i].refused_by_holdout) continue;
     refused.push_back(result.found[i]);
@@ -128,17 +128,13 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   StabilitySelection selection(experiments, drive, terms, estimation::Balance::motor, kPolicy);
   const Stability& stability = selection.result();
   Resampling result;
-  if (const std::optional<TimeLag> lag = selection.time_lag(first_names(decide(stability, kPolicy)))) {
+  if (const std::optional<TimeLag> lag = selection.time_lag(first_names(frequent_groups(stability, kPolicy)))) {
     selection.correct_lag(*lag);
     result.lag_s = lag->lag_s;
     result.lag_std_s = lag->std_s;
     result.lag_share = lag->reduction_share;
   }
-  result.subsamples = stability.subsamples;
-  result.too_little = stability.subsamples == 0.0 && selection.tables().table.model_columns > 0;
-  result.abstained = stability.abstained;
   result.torque_has_noise = selection.tables().torque_has_noise;
-  result.von_neumann_ratio = stability.von_neumann_ratio;
   result.highest_hz = selection.tables().bandwidth.highest_hz;
   result.lowest_hz =
       result.highest_hz * std::pow(kPolicy.bandwidth_factor, static_cast<double>(kPolicy.bandwidths - 1));
@@ -148,6 +144,10 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
   for (const catalogue::Entry* entry : selection.tables().table.not_visible)
     result.not_visible.emplace_back(entry->name());
   find_instead_of_refused(selection, terms, result);
+  result.subsamples = stability.subsamples;
+  result.too_little = stability.subsamples == 0.0 && selection.tables().table.model_columns > 0;
+  result.abstained = stability.abstained;
+  result.von_neumann_ratio = stability.von_neumann_ratio;
   return result;
 }
 
@@ -161,6 +161,12 @@ bool Resampling::FoundTerm::is_most_of_held_out_error() const {
 
 bool Resampling::FoundTerm::is_confirmed() const {
   return held_out_ratio && *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.line_share;
+}
+
+bool Resampling::FoundTerm::is_unknown_structure() const {
+  if (!group.empty() || refused_by_holdout) return false;
+  return held_out_ratio ? *held_out_ratio * *held_out_ratio <= 1.0 - kPolicy.law_share
+                        : frequency >= kPolicy.certain_frequency;
 }
 
 std::vector<NamedEffect> Resampling::found_group(const NamedEffect& name) const {

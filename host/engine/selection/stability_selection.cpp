@@ -177,10 +177,11 @@ namespace {
 // How often a term was chosen, over the subsamples of all settings.
 struct Count {
   Frequency f;
-  double was = 0.0, first = 0.0;
-  // With reversals, and without: subsamples, those that do not abstain, and those with it or nearly.
-  std::array<double, 2> open{}, could{}, near{};
-  double all() const { return could[0] + could[1]; }
+  double chosen = 0.0, first = 0.0;
+  // With reversals, and without: subsamples that it was offered to, those of them that voted (did not abstain), and
+  // those that chose it or something hardly better.
+  std::array<double, 2> offered{}, voted{}, chosen_or_near{};
+  double all() const { return voted[0] + voted[1]; }
   std::map<std::string, double> alternatives;
   std::vector<double> shares;
 };
@@ -192,55 +193,52 @@ const std::string& name_of(const RegressorTable& table, int term) {
 }
 
 // Terms by name that a subsample of a setting may count for, or against; null: presliding.
-using OpenTerms = std::map<std::string, const CandidateTerm*>;
+using OfferedTerms = std::map<std::string, const CandidateTerm*>;
 
-// Counts a subsample that does not abstain: each open name once, although a law may have been taken at two values of
-// its nonlinear parameter. Returns the share of the excess that its steps explain.
-double count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, const OpenTerms& open,
-                   Counts& counts) {
+// Counts a subsample that does not abstain: each offered name once, although a law may have been taken at two values of
+// its nonlinear parameter.
+void count_steps(const RegressorTable& table, const SelectionPath& vote, bool mask, const OfferedTerms& offered,
+                 Counts& counts) {
   struct Chosen {
     double share = 0.0;
     std::set<std::string> alternatives;
   };
   std::map<std::string, Chosen> chosen;
   std::set<std::string> near;
-  double sum = 0.0;
   for (const SelectionStep& s : vote.steps) {
     Chosen& one = chosen[name_of(table, s.term)];
     one.share += s.of_all;
     one.alternatives.insert(s.alternatives.begin(), s.alternatives.end());
     near.insert(s.alternatives.begin(), s.alternatives.end());
-    sum += s.of_all;
   }
-  const auto is_open = [&](const std::string& name) { return open.count(name) != 0; };
+  const auto is_offered = [&](const std::string& name) { return offered.count(name) != 0; };
   for (const auto& [name, one] : chosen) {
-    if (!is_open(name)) continue;
+    if (!is_offered(name)) continue;
     Count& c = counts[name];
-    c.was += 1.0;
+    c.chosen += 1.0;
     c.shares.push_back(one.share);
     for (const std::string& other : one.alternatives)
-      if (other != name && is_open(other)) c.alternatives[other] += 1.0;
+      if (other != name && is_offered(other)) c.alternatives[other] += 1.0;
     near.insert(name);
   }
   for (const std::string& name : near)
-    if (is_open(name)) counts[name].near[mask ? 1 : 0] += 1.0;
-  if (!vote.steps.empty() && is_open(name_of(table, vote.steps.front().term)))
+    if (is_offered(name)) counts[name].chosen_or_near[mask ? 1 : 0] += 1.0;
+  if (!vote.steps.empty() && is_offered(name_of(table, vote.steps.front().term)))
     counts[name_of(table, vote.steps.front().term)].first += 1.0;
-  return sum;
 }
 
 // Of a term that was chosen at least once.
 Frequency frequency_of(Count& c) {
   constexpr double kOften = 0.3;
-  c.f.frequency = c.was / c.all();
+  c.f.frequency = c.chosen / c.all();
   c.f.first = c.first / c.all();
-  c.f.near = (c.near[0] + c.near[1]) / c.all();
+  c.f.near = (c.chosen_or_near[0] + c.chosen_or_near[1]) / c.all();
   c.f.least_near_by_mask = 1.0;
   for (const std::size_t mask : {0, 1})
-    if (c.open[mask] > 0.0)
-      c.f.least_near_by_mask = std::min(c.f.least_near_by_mask, c.near[mask] / std::max(1.0, c.could[mask]));
+    if (c.offered[mask] > 0.0)
+      c.f.least_near_by_mask = std::min(c.f.least_near_by_mask, c.chosen_or_near[mask] / std::max(1.0, c.voted[mask]));
   for (const auto& [other, times] : c.alternatives)
-    if (times >= kOften * c.was) c.f.alternatives.emplace_back(other, times / c.was);
+    if (times >= kOften * c.chosen) c.f.alternatives.emplace_back(other, times / c.chosen);
   std::sort(c.shares.begin(), c.shares.end());
   const auto quantile_of_shares = [&](double q) {
     return c.shares[static_cast<std::size_t>(std::lround(q * static_cast<double>(c.shares.size() - 1)))];
@@ -256,43 +254,41 @@ Frequency frequency_of(Count& c) {
 void StabilitySelection::count() {
   const RegressorTable& table = tables_.table;
   Counts counts;
-  std::vector<double> explained, white;
+  std::vector<double> white;
   for (std::size_t i = 0; i < per_setting_.size(); ++i) {
     if (per_setting_[i].votes.empty()) continue;
-    OpenTerms open;
+    OfferedTerms offered;
     for (const int t : per_setting_[i].terms) {
       const CandidateTerm& term = table.terms[static_cast<std::size_t>(t)];
-      open[term.name] = &term;
+      offered[term.name] = &term;
     }
-    if (tables_.shows_presliding(tables_.settings[i]) && !is_left_out(kPresliding)) open[kPresliding] = nullptr;
+    if (tables_.shows_presliding(tables_.settings[i]) && !is_left_out(kPresliding)) offered[kPresliding] = nullptr;
     for (const SelectionPath& vote : per_setting_[i].votes) {
       result_.subsamples += 1.0;
-      for (const auto& [name, term] : open) counts[name].open[tables_.settings[i].second ? 1 : 0] += 1.0;
-      if (vote.extrapolates) result_.extrapolated += 1.0;
+      for (const auto& [name, term] : offered) counts[name].offered[tables_.settings[i].second ? 1 : 0] += 1.0;
       if (vote.abstains) {
         result_.abstained += 1.0;
         continue;
       }
-      for (const auto& [name, term] : open) {
+      for (const auto& [name, term] : offered) {
         Count& c = counts[name];
         c.f.name = name;
         if (term) {
           c.f.entry = term->entry;
           c.f.order = term->order;
         }
-        c.could[tables_.settings[i].second ? 1 : 0] += 1.0;
+        c.voted[tables_.settings[i].second ? 1 : 0] += 1.0;
       }
-      explained.push_back(count_steps(table, vote, tables_.settings[i].second, open, counts));
+      count_steps(table, vote, tables_.settings[i].second, offered, counts);
     }
   }
   for (std::size_t i = 0; i < per_setting_.size(); ++i)
     if (tables_.settings[i].second && per_setting_[i].von_neumann_ratio >= 0.0 &&
         tables_.settings[i].first <= 1.01 * tables_.bandwidth.highest_hz)
       white.push_back(std::min(1.0, per_setting_[i].von_neumann_ratio));
-  result_.explained = numbers::upper_median(explained);
   result_.von_neumann_ratio = numbers::upper_median(white);
   for (auto& [name, c] : counts)
-    if (c.was > 0.0 && c.all() > 0.0) result_.frequencies.push_back(frequency_of(c));
+    if (c.chosen > 0.0 && c.all() > 0.0) result_.frequencies.push_back(frequency_of(c));
   std::sort(result_.frequencies.begin(), result_.frequencies.end(),
             [](const Frequency& a, const Frequency& b) { return a.frequency > b.frequency; });
 }

@@ -27,10 +27,8 @@ struct Frequency {
 struct Stability {
   std::vector<Frequency> frequencies;  // largest first
   double subsamples = 0.0, abstained = 0.0;
-  double extrapolated = 0.0;  // of the subsamples: the model alone does not carry over
   // Of what is left, reversals masked, halved: semivariance over variance (von Neumann 1941); median of the settings.
   double von_neumann_ratio = 0.0;
-  double explained = 0.0;  // share of the excess that all steps take off, median
 };
 
 class StabilitySelection {

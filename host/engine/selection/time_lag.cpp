@@ -86,7 +86,8 @@ LagWithin best_lag_within(int most_rows, double row_s, const RegressorTable& tab
   const Eigen::VectorXd left = residuals.col(best);
   const double tau = std::max(1.0, estimation::autocorrelation_time(ranges, left));
   const double variance = left.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, left.size() - columns));
-  // Squares over the lag are least + curvature/2 (lag/step)^2, and twice the variance is what one standard error adds.
+  // Squares over the lag are least + curvature/2 (lag/step)^2, and one standard error adds the variance, times the
+  // samples that count as one.
   lag.std_s = step * std::sqrt(2.0 * variance * tau / curvature);
   const double without = squares[tried / 2];
   const double floor = std::min(semivariance(setting, left) * static_cast<double>(left.size()), 0.999 * without);

@@ -241,6 +241,7 @@ void check_unknown_structure(BalanceSearch& search, const CandidateFit* named, D
       return;
     }
     result.named.clear();
+    result.recovered_percent.reset();
     result.remaining_structure = result.localised;
   } else if (likelihood_gain(search.base, with_curve(search, *unknown), unknown->curve.effective_degrees_of_freedom)
                  .score < kPolicy.curve_score) {

@@ -172,10 +172,9 @@ estimation::LearnedTable learn(estimation::Identification& base, const model::Ef
            "record motion over the range that the table is to have, with the sensors that show it");
     if (learned->score < kPolicy.table_score || learned->decrease_percent < kPolicy.least_table_percent)
       fail("no_gain",
-           fmt::format(
-               "a table over {} does not lower the error on samples that its fit did not see: it decreases by {:.2f} % "
-               "(score {:.0f}, {:.0f} is needed)",
-               variable, learned->decrease_percent, learned->score, kPolicy.table_score),
+           fmt::format("a table over {} hardly lowers the error on samples that its fit did not see: by {:.2f} % "
+                       "(score {:.0f}, {:.0f} is needed)",
+                       variable, learned->decrease_percent, learned->score, kPolicy.table_score),
            "`flexspline diagnose` shows what the rest depends on; the model is left as it is");
     return std::move(*learned);
   }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numbers>
 
 #include "host/common/text/nearest.hpp"
 #include "host/input/data/units.hpp"
@@ -230,10 +229,8 @@ std::optional<Conversion> conversion_of(const PlannedColumn& planned, const Colu
                                         const Experiment& experiment, Findings& findings) {
   const bool of_output = planned.column == Column::output_position || planned.column == Column::output_velocity;
   const std::optional<double>& counts = of_output ? experiment.output_encoder_counts : experiment.encoder_counts;
-  std::optional<double> per_count;
-  if (counts) per_count = (axis == Axis::rotary ? 2.0 * std::numbers::pi : 1.0) / *counts;
   return convert({column_name(planned.column), quantity_of(planned.column, axis), planned.mapping, plan.mapping_file},
-                 per_count, of_output ? "output_encoder_counts" : "encoder_counts", findings);
+                 encoder_step(counts, axis), of_output ? "output_encoder_counts" : "encoder_counts", findings);
 }
 
 std::optional<Conversion> time_conversion(const ColumnPlan& plan, Findings& findings) {

@@ -97,11 +97,17 @@ char separator_of(std::string_view line) {
   constexpr std::string_view kSeparators = "\t;,";
   std::array<std::size_t, 3> count{};
   bool quoted = false;
-  for (const char c : line) {
-    if (c == '"') quoted = !quoted;
-    const std::size_t which = quoted ? std::string_view::npos : kSeparators.find(c);
-    if (which != std::string_view::npos) ++count[which];
+  const auto is_digit = [&](std::size_t at) { return at < line.size() && line[at] >= '0' && line[at] <= '9'; };
+  std::size_t decimal_marks = 0;  // commas that may be some
+  for (std::size_t at = 0; at < line.size(); ++at) {
+    if (line[at] == '"') quoted = !quoted;
+    const std::size_t which = quoted ? std::string_view::npos : kSeparators.find(line[at]);
+    if (which == std::string_view::npos) continue;
+    ++count[which];
+    if (line[at] == ',' && at > 0 && is_digit(at - 1) && is_digit(at + 1)) ++decimal_marks;
   }
+  // A line of numbers with a decimal comma has one more of these than separators.
+  if (count[0] + count[1] > 0 && count[2] == decimal_marks) count[2] = 0;
   const auto most = std::max_element(count.begin(), count.end());
   if (*most > 0) return kSeparators[static_cast<std::size_t>(most - count.begin())];
   return trimmed(line).find(' ') == std::string_view::npos ? ',' : ' ';

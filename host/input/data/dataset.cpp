@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <numbers>
+
 #include "host/input/data/units.hpp"
 
 namespace flexspline::data {
@@ -29,6 +31,11 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 }  // namespace
+
+std::optional<double> encoder_step(const std::optional<double>& counts, Axis axis) {
+  if (!counts || !(*counts > 0.0)) return std::nullopt;
+  return (axis == Axis::rotary ? 2.0 * std::numbers::pi : 1.0) / *counts;
+}
 
 std::string_view column_name(Column column) {
   return kNames[static_cast<std::size_t>(column)];

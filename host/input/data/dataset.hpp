@@ -68,8 +68,8 @@ struct Experiment {
   std::vector<Segment> segments;
   // Samples that must not be used (clipped, for one), as found by `load`; same length as time_s.
   std::vector<std::uint8_t> masked;
-  std::optional<double> encoder_counts;         // per motor turn (or per metre on a linear axis)
-  std::optional<double> output_encoder_counts;  // per output turn
+  // Of the motor's encoder and of the output's: in a turn, on a linear axis in a metre. See encoder_step().
+  std::optional<double> encoder_counts, output_encoder_counts;
   PositionZero motor_position_zero = PositionZero::none;
   PositionZero output_position_zero = PositionZero::none;
   std::vector<std::string> unused_columns;  // names in the file that are not mapped
@@ -108,6 +108,9 @@ struct LoadOptions {
   std::vector<std::string> tolerate;  // kinds of findings that are warnings then, not errors
   bool holdout = false;               // every experiment is used for scoring, none for fitting (`--holdout`)
 };
+
+// Smallest step of an encoder with so many counts, rad or m; nothing where the counts are not stated.
+std::optional<double> encoder_step(const std::optional<double>& counts, Axis axis);
 
 // Reads any number of files, folders and dataset.tomls. A folder with a dataset.toml is read by that file, one
 // without by its CSV and MAT files in the order of their names; a dataset.toml names which files belong and how columns

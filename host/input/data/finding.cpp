@@ -33,7 +33,7 @@ std::string Finding::text() const {
 DataError::DataError(std::vector<Finding> findings)
     : std::runtime_error(joined(findings)), findings_(std::move(findings)) {}
 
-std::vector<std::string> warning_texts(const std::vector<Finding>& findings) {
+std::vector<std::string> texts_of(const std::vector<Finding>& findings, Severity severity) {
   constexpr std::size_t kFewestToJoin = 3;
   std::vector<std::string> texts;
   const auto is_alike = [](const Finding& a, const Finding& b) {
@@ -41,7 +41,7 @@ std::vector<std::string> warning_texts(const std::vector<Finding>& findings) {
   };
   for (std::size_t i = 0; i < findings.size(); ++i) {
     const Finding& finding = findings[i];
-    if (finding.severity != Severity::warning) continue;
+    if (finding.severity != severity) continue;
     std::size_t before = 0;
     std::vector<std::string> others;
     for (std::size_t j = 0; j < findings.size(); ++j) {

@@ -24,9 +24,12 @@ struct Finding {
   std::string text() const;
 };
 
-// The warnings as texts. Of what three or more files share, the first text stands for all and names the other files:
-// `flexspline check` lists each.
-std::vector<std::string> warning_texts(const std::vector<Finding>& findings);
+// The findings of one severity as texts. Of what three or more files share, the first text stands for all and names the
+// other files: `flexspline check` lists each.
+std::vector<std::string> texts_of(const std::vector<Finding>& findings, Severity severity);
+inline std::vector<std::string> warning_texts(const std::vector<Finding>& findings) {
+  return texts_of(findings, Severity::warning);
+}
 
 // Unusable measurements: exit 2.
 class DataError : public std::runtime_error {

@@ -42,6 +42,15 @@ std::string cause_of(double factor, const DriveFacts& drive) {
   return "";
 }
 
+// Where none is stated, a factor as those of gears may be one.
+std::string possible_gear(double factor, const DriveFacts& drive) {
+  if (drive.gear_ratio || std::abs(factor) < 20.0 || std::abs(factor) > 1000.0) return "";
+  return fmt::format(
+      "; or the position is the output's and the velocity the motor's, with a gear ratio of about {:.4g}: state "
+      "gear_ratio then",
+      std::abs(factor));
+}
+
 // Beyond a factor of two no filter or delay explains it.
 bool is_of_units(double factor) {
   return std::abs(factor) > 2.0 || std::abs(factor) < 0.5;
@@ -64,7 +73,9 @@ void check_velocity(const Experiment& experiment, Column position, Column veloci
   if (!ratio.meaningful || (ratio.factor >= 0.95 && ratio.factor <= 1.05)) return;
   std::string cause = cause_of(ratio.factor, drive);
   const bool of_units = cause.empty() && is_of_units(ratio.factor);
-  if (of_units) cause = "the unit of one of them, or its counts per turn, is likely another one";
+  if (of_units)
+    cause =
+        "the unit of one of them, or its counts per turn, is likely another one" + possible_gear(ratio.factor, drive);
   findings.add(
       Severity::error, "velocity_position_mismatch", experiment.file.string(), 0, std::string(column_name(velocity)),
       fmt::format("in \"{}\" it is {:.4g} times the derivative of {}{}{}", experiment.name, ratio.factor,

@@ -193,11 +193,20 @@ std::string verdict_in_words(const Diagnosis& d) {
         return "Nothing is missing: friction differs from run to run, and otherwise the model's error is the noise "
                "of the measurement.";
       return "Nothing is missing: the model's error is the noise of the measurement.";
-    case Verdict::nothing_significant:
-      if (!d.possible.empty())
-        return "No effect of the catalogue can be named; what may be missing is below. The noise level is not known.";
-      return "No effect of the catalogue improves the model. The noise level is not known, so a small effect may be "
-             "missing.";
+    case Verdict::nothing_significant: {
+      const bool is_more_below = !d.possible.empty() || (d.resampling && !d.resampling->found.empty());
+      if (is_more_below)
+        return fmt::format("No effect of the catalogue can be named; what may be missing is below. The {}.",
+                           d.noise_floor     ? "model's error is above the noise of the measurement"
+                           : d.noise_of_some ? "noise level is known in some records only"
+                                             : "noise level is not known");
+      if (d.noise_floor)
+        return "No effect of the catalogue improves the model. Its error is above the noise of the measurement, but "
+               "depends on no measured signal.";
+      return fmt::format(
+          "No effect of the catalogue improves the model. The noise level is {}, so a small effect may be missing.",
+          d.noise_of_some ? "known in some records only" : "not known");
+    }
     case Verdict::unknown_structure:
       return "Something is missing that no effect of the catalogue explains.";
     case Verdict::insufficient_excitation:

@@ -212,8 +212,11 @@ json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::st
   json result = diagnosis_json(rounds.front());
   std::vector<selection::NamedEffect> all;
   for (const Diagnosis& d : rounds) {
-    // The last round ends the search; it names nothing that was added.
-    if (&d != &rounds.back() || rounds.size() == 1) all.insert(all.end(), d.named.begin(), d.named.end());
+    // Of each round the first name was added; the last one ends the search, and adds nothing.
+    if (rounds.size() == 1)
+      all = d.named;
+    else if (&d != &rounds.back())
+      all.push_back(d.named.front());
     result["rounds"].push_back(diagnosis_json(d));
   }
   std::erase_if(all, [&](const selection::NamedEffect& n) {

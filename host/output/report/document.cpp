@@ -9,6 +9,7 @@
 
 #include "host/common/text/build_identity.hpp"
 #include "host/engine/comparison/compare.hpp"
+#include "host/output/answers/comparison.hpp"
 #include "host/output/answers/diagnosis.hpp"
 #include "host/output/answers/identification.hpp"
 #include "host/output/answers/json.hpp"
@@ -32,7 +33,7 @@ std::string title_of(const Subject& subject) {
 
 // Regions repeat what the maps show.
 json comparison_json(const comparison::Comparison& comparison) {
-  json answer = comparison::to_json(comparison);
+  json answer = output::comparison_json(comparison);
   answer.erase("regions");
   return answer;
 }

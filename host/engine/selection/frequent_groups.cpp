@@ -1,4 +1,4 @@
-#include "host/engine/selection/decision.hpp"
+#include "host/engine/selection/frequent_groups.hpp"
 
 #include <algorithm>
 #include <set>
@@ -19,9 +19,8 @@ double least_frequency(const FoundTerm& found, bool unknown, const SelectionPoli
   return strict && found.group.front().name != kPresliding ? policy.certain_frequency : policy.named_frequency;
 }
 
-// Waves that take off no more than a placebo wave found with them are not more significant than that.
-bool is_no_more_than_placebo(const FoundTerm& term, const std::vector<FoundTerm>& found,
-                             const SelectionPolicy& policy) {
+// Waves that take off less than twice what a placebo wave found with them does are not more significant than that.
+bool is_near_placebo(const FoundTerm& term, const std::vector<FoundTerm>& found, const SelectionPolicy& policy) {
   double placebo_share = 0.0;
   for (const FoundTerm& f : found)
     if (is_placebo(f.group.front())) placebo_share = std::max(placebo_share, f.share);
@@ -89,7 +88,7 @@ std::vector<FoundTerm> groups_chosen(const Stability& stability, double least, s
 
 }  // namespace
 
-std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy) {
+std::vector<FoundTerm> frequent_groups(const Stability& stability, const SelectionPolicy& policy) {
   // Most subsamples abstain: nothing is above the noise.
   if (stability.abstained > policy.most_abstaining * stability.subsamples) return {};
   std::set<std::string> taken;
@@ -101,7 +100,7 @@ std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy&
            (f.frequency < least_frequency(f, unknown, policy) || f.least_by_mask < 1.0 - policy.named_frequency);
   });
   const std::vector<FoundTerm> with_waves = all;
-  std::erase_if(all, [&](const FoundTerm& f) { return is_no_more_than_placebo(f, with_waves, policy); });
+  std::erase_if(all, [&](const FoundTerm& f) { return is_near_placebo(f, with_waves, policy); });
   std::stable_sort(all.begin(), all.end(), [](const FoundTerm& a, const FoundTerm& b) { return a.share > b.share; });
   return all;
 }
@@ -113,8 +112,7 @@ std::vector<FoundTerm> undecided(const Stability& stability, const std::vector<F
   for (const FoundTerm& one : found)
     for (const Frequency& f : one.group) taken.insert(f.name);
   std::vector<FoundTerm> all = groups_chosen(stability, 1.0 - policy.named_frequency, taken, policy);
-  std::erase_if(
-      all, [&](const FoundTerm& term) { return !term.in_catalogue || is_no_more_than_placebo(term, found, policy); });
+  std::erase_if(all, [&](const FoundTerm& term) { return !term.in_catalogue || is_near_placebo(term, found, policy); });
   std::stable_sort(all.begin(), all.end(),
                    [](const FoundTerm& a, const FoundTerm& b) { return a.frequency > b.frequency; });
   return all;

@@ -17,7 +17,7 @@ struct FoundTerm {
 };
 
 // Largest share first.
-std::vector<FoundTerm> decide(const Stability& stability, const SelectionPolicy& policy);
+std::vector<FoundTerm> frequent_groups(const Stability& stability, const SelectionPolicy& policy);
 
 // Terms of the catalogue, and groups, that are neither found nor ruled out: fewer subsamples chose them than must, and
 // fewer did not than must. Most frequent first.

@@ -1,13 +1,19 @@
+#include "host/output/answers/comparison.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 
-#include "host/engine/comparison/compare.hpp"
-
-namespace flexspline::comparison {
+namespace flexspline::output {
 namespace {
+
+using comparison::BaselineResult;
+using comparison::Comparison;
+using comparison::ExperimentResult;
+using comparison::Region;
+using comparison::SignalResult;
 
 constexpr std::size_t kRegionsInWords = 3;
 
@@ -80,7 +86,7 @@ std::string baseline_table(const std::vector<BaselineResult>& results) {
 
 }  // namespace
 
-std::string table(const Comparison& comparison) {
+std::string comparison_table(const Comparison& comparison) {
   std::size_t width = std::string_view("all together").size();
   for (const ExperimentResult& e : comparison.experiments) width = std::max(width, label(e).size());
   std::string text = fmt::format("{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", width,
@@ -129,4 +135,4 @@ std::string table(const Comparison& comparison) {
   return text;
 }
 
-}  // namespace flexspline::comparison
+}  // namespace flexspline::output
