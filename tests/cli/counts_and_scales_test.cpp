@@ -30,6 +30,14 @@ TEST(CountsAndScales, CountsTakenForRadiansAreNamedAndTheirSizesAskedFor) {
       "--map 'motor_velocity_rad_s=present_velocity:0.229 rpm'");
 }
 
+TEST(CountsAndScales, WholeNumbersAreCountsWhereTheCountsOfATurnAreStated) {
+  const Shell shell;
+  shell.write("log.csv", log_of("time_ms,motor_encoder,motor_speed_rad_s,motor_current_a",
+                                {time_in(1e-3), whole(1.0 / kCount_rad, angle), speed, torque}));
+  shell.must("flexspline new --from log.csv --out project --torque-constant 1 --encoder-counts 4096");
+  EXPECT_TRUE(contains(shell.file("project/dataset.toml"), "unit = \"counts\"")) << shell.file("project/dataset.toml");
+}
+
 TEST(CountsAndScales, ANumberAloneIsAScaleInTheColumnsOwnUnit) {
   const Shell shell;
   shell.write("log.csv", log_of("time,pos_deg,torque [%]", {time_in(1.0), times(180.0 / M_PI / 2.0, angle), torque}));

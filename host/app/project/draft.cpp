@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "host/app/project/candidates.hpp"
+#include "host/app/project/unit_guess.hpp"
 #include "host/common/text/nearest.hpp"
 #include "host/input/data/record_summary.hpp"
 #include "host/input/data/recording.hpp"
@@ -123,25 +124,6 @@ ColumnGuess mapping_of(const std::string& text, const std::vector<std::string>& 
   return guess;
 }
 
-// Values of some columns of one table in a file, by name; empty where it does not have one.
-std::vector<std::vector<double>> values_of(const data::Recording& recording, const std::vector<std::string>& names) {
-  const std::vector<std::string>& there = recording.names();
-  const auto find_name = [&](const std::string& name) {
-    return std::find(there.begin(), there.end(), data::name_of_element(there, name, 1));
-  };
-  std::vector<std::size_t> wanted;
-  std::vector<std::optional<std::size_t>> refs;
-  for (const std::string& name : names) {
-    const auto at = find_name(name);
-    refs.push_back(at == there.end() ? std::nullopt : std::optional(wanted.size()));
-    if (at != there.end()) wanted.push_back(static_cast<std::size_t>(at - there.begin()));
-  }
-  const data::Table table = recording.read(wanted);
-  std::vector<std::vector<double>> values;
-  for (const auto& ref : refs) values.push_back(ref ? table.columns[*ref] : std::vector<double>{});
-  return values;
-}
-
 using Lengths = std::vector<std::pair<std::string, std::size_t>>;
 
 // The runs of a struct array have the same names, so that one mapping fits them all; here they have the first one's
@@ -204,34 +186,6 @@ ColumnGuess* find(std::vector<ColumnGuess>& columns, std::string_view ours) {
   return nullptr;
 }
 
-double factor_of(const std::string& unit) {
-  const auto known = data::unit_from_text(unit);
-  return known ? known->factor : 1.0;
-}
-
-// Units that names do not give, from the values of the first file.
-void guess_units(std::vector<ColumnGuess>& columns, const data::Recording& recording) {
-  ColumnGuess* time = find(columns, "time_s");
-  ColumnGuess* velocity = find(columns, "motor_velocity_rad_s");
-  const ColumnGuess* position = find(columns, "motor_position_rad");
-  const auto source = [](const ColumnGuess* c, const char* ours) { return c ? c->theirs : std::string(ours); };
-  auto values = values_of(recording, {source(time, "time_s"), source(position, "motor_position_rad"),
-                                      source(velocity, "motor_velocity_rad_s")});
-  if (time != nullptr && time->unit.empty())
-    if (const auto unit = time_unit_by_values(values[0])) {
-      time->unit = *unit;
-      time->why = fmt::format("\"{}\" reads as a time, in {} by the size of its steps", time->theirs, *unit);
-    }
-  if (velocity == nullptr || !velocity->unit.empty() || values[1].empty()) return;
-  for (double& t : values[0]) t *= time != nullptr ? factor_of(time->unit) : 1.0;
-  for (double& q : values[1]) q *= position != nullptr ? factor_of(position->unit) : 1.0;
-  if (const auto unit = velocity_unit_by_values(values[0], values[1], values[2])) {
-    velocity->unit = *unit;
-    velocity->why =
-        fmt::format("\"{}\" reads as a velocity, in {} by comparison with the position", velocity->theirs, *unit);
-  }
-}
-
 // Position and velocity of two sides of the gear: where one is the other's rate times the gear ratio, both become the
 // motor's, whatever side was taken for both.
 void take_sides_of_values(HeaderGuess& guess, const data::Recording& recording, const Request& request) {
@@ -243,7 +197,7 @@ void take_sides_of_values(HeaderGuess& guess, const data::Recording& recording, 
   if (position == nullptr || velocity == nullptr || ratio < 2.0) return;
   auto values = values_of(recording, {time != nullptr ? time->theirs : "time_s", position->theirs, velocity->theirs});
   for (double& t : values[0]) t *= time != nullptr ? factor_of(time->unit) : 1.0;
-  for (double& q : values[1]) q *= factor_of(position->unit);
+  for (double& q : values[1]) q *= factor_of(*position, request);
   for (double& w : values[2]) w *= factor_of(velocity->unit);
   const double factor = std::abs(velocity_over_slope(values[0], values[1], values[2]).value_or(1.0));
   const auto is = [&](double wanted) { return std::abs(factor / wanted - 1.0) < kSameRatio; };
@@ -404,7 +358,7 @@ HeaderGuess guess_of_files(const LoggedFiles& logged, const Request& request) {
                                    guess.joints.empty()
                                        ? std::string("no position or velocity has the number of a joint")
                                        : fmt::format("the joints are {}", fmt::join(guess.joints, ", "))));
-  guess_units(guess.columns, *logged.first);
+  guess_units(guess.columns, *logged.first, request);
   take_sides_of_values(guess, *logged.first, request);
   turn(guess, request.turned);
   return guess;

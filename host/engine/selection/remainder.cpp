@@ -14,6 +14,14 @@ namespace {
 std::string drift_text(const Drift& drift, const estimation::PreparedData& prepared) {
   const bool has_temperature = std::any_of(prepared.records.begin(), prepared.records.end(),
                                            [](const estimation::Record& r) { return r.has_temperature; });
+  // The largest that is looked for is half of the value.
+  constexpr double kMost_percent = 45.0;
+  if (drift.percent > kMost_percent)
+    return fmt::format(
+        "{} differs between runs by half its value or more, which the model does not explain. So much is seldom the "
+        "temperature: some runs hardly show it, or the friction law is another one. Record slow and fast motion in one "
+        "run",
+        drift.group);
   return fmt::format(
       "{} differs between runs by {:.1f} %, which the model does not explain. {} An effect that shows only from run to "
       "run counts for less then; repeat one motion from time to time",

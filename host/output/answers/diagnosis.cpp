@@ -109,6 +109,8 @@ void print_next(Console& console, const Diagnosis& d, const std::string& add_com
         steps.push_back(fmt::format(
             "flexspline plan --separate {},{} --help   shows how to record what distinguishes them",
             effect_label(d.named[0].effect, d.named[0].order), effect_label(d.named[1].effect, d.named[1].order)));
+      if (d.verdict == Verdict::missing_effect && !steps.empty() && (d.partial || !d.possible.empty()))
+        steps.push_back("diagnose again with that model, as a large effect hides smaller ones; --auto does both");
       break;
     case Verdict::unknown_structure:
       if (d.unknown)
@@ -291,7 +293,7 @@ void print_confounded_with_model(Console& console, const Diagnosis& d) {
 }
 
 void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
-  console.line(console.bold(verdict_in_words(d)));
+  console.line(console.bold(wrapped(verdict_in_words(d), 0)));
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
   print_possible(console, d.possible);
