@@ -134,6 +134,7 @@ TEST(NamingRules, GiveTheirReasonsToThePossibleEffects) {
 
 TEST(UnknownStructure, IsCertainWhereHeldOutDataConfirmItOrNearlyAllHalvesChoseIt) {
   Resampling::FoundTerm term = found({});
+  term.held_out_ratio.reset();
   term.frequency = 0.95;
   EXPECT_TRUE(term.is_unknown_structure());
   term.frequency = 0.8;
