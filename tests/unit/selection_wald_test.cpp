@@ -38,6 +38,11 @@ TEST(WaldTest, LawsWithNonlinearParametersHaveNone) {
   EXPECT_FALSE(wald_p_value(law));
   law.parameters.back().fixed = true;
   EXPECT_TRUE(wald_p_value(law));
+  // Its error changes nothing.
+  Candidate presliding = candidate({0.1});
+  presliding.effect = "dahl_friction";
+  presliding.parameters.front().ref.parameter = catalogue::get(presliding.effect).index_of("presliding");
+  EXPECT_FALSE(wald_p_value(presliding));
 }
 
 Diagnosis with(Candidate c) {

@@ -9,9 +9,12 @@
 namespace flexspline::selection {
 
 std::optional<double> wald_p_value(const Candidate& candidate) {
+  const catalogue::Entry* const entry = catalogue::find(candidate.effect);
   double parameters = 0.0, chi2 = 0.0;
   for (const estimation::Estimate& e : candidate.parameters) {
     if (e.fixed) continue;
+    // A nonlinear parameter has no value where the amplitude is zero, so that the test does not hold (Davies 1977).
+    if (entry && entry->parameters[e.ref.parameter].kind == effects::Kind::nonlinear) return std::nullopt;
     if (!e.std || !(*e.std > 0.0)) return std::nullopt;
     parameters += 1.0;
     chi2 += (e.value / *e.std) * (e.value / *e.std);
