@@ -107,7 +107,7 @@ TEST(UnfinishedProject, WhatCanBeToleratedStandsInTheLine) {
 
 TEST(UnfinishedProject, AVelocityOfTheOtherSideAsksForTheGearRatio) {
   const Shell shell;
-  std::string text = "time_s,iq_a,q_actual_rad,motor_speed_rad_s\n";
+  std::string text = "time_s,iq_a,position_rad,motor_speed_rad_s\n";
   for (int k = 0; k < 4000; ++k) {
     char line[120];
     std::snprintf(line, sizeof line, "%.3f,%.6f,%.8f,%.6f\n", 0.001 * k, std::cos(0.006 * k), 0.5 * std::sin(0.006 * k),
