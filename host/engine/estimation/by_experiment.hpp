@@ -1,5 +1,5 @@
 // What each experiment alone says of a parameter, and how far the experiments agree: std/avg, the report's measure of
-// reliability. The reliability of an experiment is that of its own standard error, never by that of the pooled fit: one
+// reliability. Whether an experiment counts follows from its own standard error, never from that of the pooled fit: one
 // that disagrees with the others would otherwise be left out for its disagreement.
 #pragma once
 
