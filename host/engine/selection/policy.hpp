@@ -1,5 +1,5 @@
-// Thresholds of the diagnosis that decide about names, in one place, with its unit and its source. Steps are those of
-// METHOD.md.
+// Thresholds of the diagnosis that decide about names, in one place, each with its unit and its source. Steps are those
+// of METHOD.md.
 #pragma once
 
 #include <cstddef>
