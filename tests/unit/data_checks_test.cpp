@@ -54,10 +54,13 @@ struct Mismatch {
 };
 
 TEST(Checks, NameTheUnitOfAVelocityThatIsNotThePositionsDerivative) {
-  for (const Mismatch& m : {Mismatch{30.0 / kPi, 1.0, "rpm"}, Mismatch{180.0 / kPi, 1.0, "deg/s"},
-                            Mismatch{1.0, 180.0 / kPi, "position is in degrees"}, Mismatch{1.0, 0.01, "gear ratio 100"},
-                            Mismatch{-1.0, 1.0, "sign"}, Mismatch{0.5 / kPi, 1.0, "turns"}, Mismatch{1.08, 1.0, ""},
-                            Mismatch{0.93, 1.0, ""}}) {
+  for (const Mismatch& m :
+       {Mismatch{30.0 / kPi, 1.0, "rpm"}, Mismatch{180.0 / kPi, 1.0, "deg/s"},
+        Mismatch{1.0, 180.0 / kPi, "position is in degrees"}, Mismatch{1.0, 0.01, "gear ratio 100"},
+        Mismatch{-1.0, 1.0, "sign"}, Mismatch{0.5 / kPi, 1.0, "velocity is in turns"}, Mismatch{1.08, 1.0, ""},
+        Mismatch{30.0 / kPi, 0.5 / kPi, "rpm and the position in turns"},
+        Mismatch{30.0 / kPi, 180.0 / kPi, "rpm and the position in degrees"},
+        Mismatch{1.0, 0.5 / kPi, "position is in turns"}, Mismatch{6.0, 1.0, "another one"}, Mismatch{0.93, 1.0, ""}}) {
     const std::vector<Finding> errors =
         errors_in("# gear_ratio: 100\n" +
                   csv_of(even_times(3000),
@@ -255,6 +258,28 @@ TEST(Checks, AWrappedPositionIsAnErrorAndToleratedItsTurnsAreAdded) {
   const Experiment& e = data.experiments[0];
   for (std::size_t k = 0; k < e.size(); ++k)
     ASSERT_NEAR(e[Column::motor_position][k], straight(e.time_s[k]), 1e-6) << k;
+}
+
+// At 200 Hz it moves 0.75 rad a sample, in the last case 2.5.
+TEST(Checks, AWrappedPositionIsFoundAtAnySpeedBelowHalfATurnASample) {
+  const std::vector<std::function<double(double)>> motions = {
+      [](double t) { return 150.0 * t; }, [](double t) { return 300.0 * std::sin(0.5 * t); },
+      [](double t) { return -2.0 * 40.0 * t * t; }, [](double t) { return 500.0 * t + std::sin(20.0 * t); }};
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    const auto wrapped = [&](double t) { return std::remainder(motions[m](t), 2.0 * kPi); };
+    const std::vector<double> times = even_times(m == 2 ? 600 : 3000, 0.005);
+    const std::string csv = csv_of(times, {{"motor_position_rad", wrapped}, {"current_a", current}});
+    const std::vector<Finding> errors = errors_in(csv);
+    ASSERT_EQ(errors.size(), 1u) << m;
+    EXPECT_EQ(errors[0].kind, "wrapped_position");
+    EXPECT_EQ(errors[0].what.find("cannot be known") != std::string::npos, m >= 2) << errors[0].what;
+    const Dataset data = loaded(csv, tolerating("wrapped_position"));
+    const Experiment& e = data.experiments[0];
+    for (std::size_t k = 0; k < e.size(); ++k)
+      ASSERT_NEAR(e[Column::motor_position][k] - e[Column::motor_position][0],
+                  motions[m](e.time_s[k]) - motions[m](e.time_s[0]), 1e-5)
+          << m << " " << k;
+  }
 }
 
 TEST(Checks, AMissingColumnIsNamedWithWhatToMap) {

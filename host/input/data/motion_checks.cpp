@@ -23,12 +23,12 @@ std::string cause_of(double factor, const DriveFacts& drive) {
   if (near(factor, -1.0)) return "its sign is turned round";
   if (near(size, 60.0 / kTurn_rad)) return "the velocity is in rpm" + sign;
   if (near(size, 360.0 / kTurn_rad)) return "the velocity is in deg/s" + sign;
-  if (near(size, 1.0 / kTurn_rad)) return "the velocity is in turns per second, or the position in turns" + sign;
+  if (near(size, 1.0 / kTurn_rad)) return "the velocity is in turns per second" + sign;
   if (near(size, kTurn_rad)) return "the position is in turns" + sign;
   if (near(size, kTurn_rad / 360.0)) return "the position is in degrees" + sign;
   if (near(size, 360e3 / kTurn_rad)) return "the velocity is in mdeg/s" + sign;
   if (near(size, kTurn_rad / 360e3)) return "the position is in millidegrees" + sign;
-  if (near(size, 6.0)) return "the velocity is in rpm and the position in turns or degrees" + sign;
+  if (near(size, 1.0 / 6.0)) return "the velocity is in rpm and the position in degrees" + sign;
   if (near(size, 1000.0)) return "the velocity is in thousandths (mm/s, mrad/s), or the time in ms" + sign;
   if (near(size, 1e-3)) return "the position is in thousandths (mm, mrad)" + sign;
   if (drive.gear_ratio && *drive.gear_ratio > 1.05) {
@@ -39,6 +39,10 @@ std::string cause_of(double factor, const DriveFacts& drive) {
       return fmt::format("that is one over the gear ratio {}: the velocity is the output's, the position the motor's{}",
                          *drive.gear_ratio, sign);
   }
+  if (near(size, 60.0))
+    return "the velocity is in rpm and the position in turns" + sign +
+           (drive.gear_ratio ? ""
+                             : "; or the velocity is the motor's, the position the output's, with a gear ratio of 60");
   return "";
 }
 
@@ -187,42 +191,95 @@ void check_gear_ratio(const Experiment& experiment, const DriveFacts& drive, Fin
                locked + "check gear_ratio, and unit and scale of both columns in dataset.toml");
 }
 
+namespace {
+
+struct Wrap {
+  std::size_t sample;  // the last one before it
+  double turns;        // of the jump: 1 or -1
+};
+
+// Where a position jumps by a turn, and by how much it moves there without that.
+class WrapSearch {
+ public:
+  WrapSearch(const std::vector<double>& position, const std::vector<double>& time_s)
+      : position_(position), time_s_(time_s) {}
+
+  void find(const Segment& segment) {
+    for (std::size_t k = segment.first + 1; k + 2 < segment.last; ++k) {
+      const double step = step_at(k), before = step_at(k - 1), after = step_at(k + 1);
+      // A longer step has another number of turns, which the neighbours' steps do not show.
+      if (std::abs(before) >= std::numbers::pi || std::abs(after) >= std::numbers::pi) continue;
+      // The step as the velocities on both sides have it; samples that were lost make it longer.
+      const double duration = time_s_[k + 1] - time_s_[k];
+      const double expected =
+          0.5 * duration * (before / (time_s_[k] - time_s_[k - 1]) + after / (time_s_[k + 2] - time_s_[k + 1]));
+      // Times that come in bursts make no velocities; slow motion is then seen by the steps alone.
+      const bool slow = std::abs(before) < kClose_rad && std::abs(after) < kClose_rad;
+      if (take(k, step, expected) || !slow) continue;
+      take(k, step, 0.0);
+    }
+  }
+
+  const std::vector<Wrap>& wraps() const { return wraps_; }
+  double longest_step() const { return longest_step_; }
+
+ private:
+  static constexpr double kClose_rad = 0.5;
+
+  double step_at(std::size_t k) const { return position_[k + 1] - position_[k]; }
+
+  bool take(std::size_t k, double step, double expected) {
+    const double turns = std::round((step - expected) / kTurn_rad);
+    const double rest = step - turns * kTurn_rad;
+    if (std::abs(turns) != 1.0 || std::abs(rest - expected) >= kClose_rad) return false;
+    wraps_.push_back({k, turns});
+    longest_step_ = std::max(longest_step_, std::abs(rest));
+    return true;
+  }
+
+  const std::vector<double>& position_;
+  const std::vector<double>& time_s_;
+  std::vector<Wrap> wraps_;
+  double longest_step_ = 0.0;
+};
+
+void add_turns(std::vector<double>& position, const std::vector<Wrap>& wraps) {
+  double turns = 0.0;
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < position.size(); ++k) {
+    position[k] -= turns * kTurn_rad;
+    if (next < wraps.size() && wraps[next].sample == k) turns += wraps[next++].turns;
+  }
+}
+
+}  // namespace
+
 void check_wrapped_positions(Experiment& experiment, Axis axis, Findings& findings) {
   if (axis != Axis::rotary) return;
+  // Beyond half a turn between samples, motion in the other direction gives the same samples.
+  constexpr double kNearlyAmbiguous_rad = 0.75 * std::numbers::pi;
   for (const Column column : {Column::motor_position, Column::output_position, Column::position_command}) {
     std::vector<double>& p = experiment[column];
-    // A turn within one sample, between steps that are small.
-    const auto turns_at = [&](std::size_t k) {
-      const double step = p[k + 1] - p[k];
-      const double turns = std::round(step / kTurn_rad);
-      return std::abs(turns) == 1.0 && std::abs(step - turns * kTurn_rad) < 0.5 ? turns : 0.0;
-    };
-    std::vector<std::size_t> wraps;
-    for (const Segment& s : experiment.segments)
-      for (std::size_t k = s.first + 1; k + 2 < s.last && !p.empty(); ++k)
-        if (std::abs(p[k + 1] - p[k]) > 4.0 && turns_at(k) != 0.0 && std::abs(p[k] - p[k - 1]) < 0.5 &&
-            std::abs(p[k + 2] - p[k + 1]) < 0.5)
-          wraps.push_back(k);
+    if (p.empty()) continue;
+    WrapSearch search(p, experiment.time_s);
+    for (const Segment& s : experiment.segments) search.find(s);
+    const std::vector<Wrap>& wraps = search.wraps();
     if (wraps.empty()) continue;
+    const std::string ambiguous =
+        search.longest_step() > kNearlyAmbiguous_rad
+            ? fmt::format(
+                  "; it moves up to {:.3g} rad between two samples there, and beyond pi the number of turns "
+                  "cannot be known",
+                  search.longest_step())
+            : "";
     const Severity severity =
         findings.add(Severity::error, "wrapped_position", experiment.file.string(), 0, std::string(column_name(column)),
-                     fmt::format("in \"{}\" it jumps by a turn {} times, first at {:.6g} s", experiment.name,
-                                 wraps.size(), experiment.time_s[wraps.front() + 1]),
+                     fmt::format("in \"{}\" it jumps by a turn {} times, first at {:.6g} s{}", experiment.name,
+                                 wraps.size(), experiment.time_s[wraps.front().sample + 1], ambiguous),
                      findings.tolerates("wrapped_position")
                          ? "the turns were added"
                          : "log the position without wrapping, or --tolerate wrapped_position to have the turns added");
-    if (severity == Severity::error) continue;
-    double turns = 0.0;
-    std::vector<double> correction(p.size(), 0.0);
-    std::size_t next = 0;
-    for (std::size_t k = 0; k < p.size(); ++k) {
-      correction[k] = -turns * kTurn_rad;
-      if (next < wraps.size() && wraps[next] == k) {
-        turns += turns_at(k);
-        ++next;
-      }
-    }
-    for (std::size_t k = 0; k < p.size(); ++k) p[k] += correction[k];
+    if (severity != Severity::error) add_turns(p, wraps);
   }
 }
 
