@@ -59,6 +59,43 @@ TEST(ArrayFiles, NumpyGoesByNameColumnAndFieldWhateverTheOrderOfBytes) {
   expect_sine(fields.columns[0], fields.columns[1]);
 }
 
+// A record array as numpy.save writes it: entries of so many bytes, after a header with this description.
+std::string record_array(const std::string& descr, const std::string& entries, std::size_t count) {
+  std::string header = fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({},), }}", descr, count);
+  header.resize((header.size() + 10 + 64) / 64 * 64 - 10, ' ');
+  header.back() = '\n';
+  const auto size = static_cast<std::uint16_t>(header.size());
+  std::string text("\x93NUMPY\x01\x00", 8);
+  text += static_cast<char>(size & 0xFFU);
+  text += static_cast<char>(size >> 8U);
+  return text + header + entries;
+}
+
+TEST(ArrayFiles, FieldsOfNumpyAfterADateAreReadAndFieldsOfSeveralNumbersRefused) {
+  constexpr std::size_t kCount = 64;
+  std::string dated, vectors;
+  const auto put = [](std::string& text, const auto& value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (std::size_t k = 0; k < kCount; ++k) {
+    put(dated, static_cast<std::int64_t>(1000000 * k));
+    put(dated, std::sin(0.06 * static_cast<double>(k)));
+    for (int n = 0; n < 4; ++n) put(vectors, 0.001 * static_cast<double>(k));
+  }
+  const TestFolder folder;
+  const auto file =
+      folder.write("dated.npy", record_array("[('time_s', '<M8[ns]'), ('current_a', '<f8')]", dated, kCount));
+  const Table table = columns(file, {"array.time_s", "array.current_a"});
+  ASSERT_EQ(table.columns.size(), 2u);
+  expect_sine(table.columns[0], table.columns[1]);
+  const std::vector<Finding> errors = errors_of(
+      {folder.write("vectors.npy", record_array("[('time_s', '<f8'), ('tau', '<f8', (3,))]", vectors, kCount))});
+  ASSERT_FALSE(errors.empty());
+  EXPECT_NE(errors[0].what.find("no single numbers"), std::string::npos) << errors[0].what;
+  // A header that describes a part of each entry alone.
+  EXPECT_FALSE(errors_of({folder.write("short.npy", record_array("[('time_s', '<f8')]", vectors, kCount))}).empty());
+}
+
 TEST(ArrayFiles, DamagedOnesEndInAMessage) {
   const TestFolder folder;
   for (const char* name : {"h5py_plain.h5", "h5py_matlab.mat", "numpy_packed.npz", "numpy_fields.npy"}) {

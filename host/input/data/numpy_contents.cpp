@@ -115,33 +115,55 @@ struct NumpyField {
   std::string name;
   std::string type;
 };
-// [('t', '<f8'), ('iq', '<f4')]
-std::vector<NumpyField> fields_of(std::string_view descr) {
+// [('t', '<f8'), ('day', '<M8[ns]')]; nothing where an entry is another one than a name and a type, such as
+// ('tau', '<f8', (3,)).
+std::optional<std::vector<NumpyField>> fields_of(std::string_view descr) {
   std::vector<NumpyField> fields;
-  std::vector<std::string> texts;
-  descr = descr.substr(0, descr.find(']'));
-  for (std::size_t at = descr.find('\''); at != std::string_view::npos; at = descr.find('\'', at + 1)) {
-    const std::size_t end = descr.find('\'', at + 1);
-    if (end == std::string_view::npos) break;
-    texts.emplace_back(descr.substr(at + 1, end - at - 1));
-    at = end;
+  // Dates have brackets of their own; no other entry of the header has.
+  descr = descr.substr(1, descr.rfind(']') - 1);
+  const auto skip = [&](std::string_view characters) {
+    descr.remove_prefix(std::min(descr.find_first_not_of(characters), descr.size()));
+  };
+  const auto text = [&]() -> std::optional<std::string> {
+    skip(" ");
+    if (!descr.starts_with('\'')) return std::nullopt;
+    const std::size_t end = descr.find('\'', 1);
+    if (end == std::string_view::npos) return std::nullopt;
+    std::string found(descr.substr(1, end - 1));
+    descr.remove_prefix(end + 1);
+    return found;
+  };
+  const auto is_next = [&](char character) {
+    skip(" ");
+    if (!descr.starts_with(character)) return false;
+    descr.remove_prefix(1);
+    return true;
+  };
+  for (skip(", "); !descr.empty(); skip(", ")) {
+    if (!is_next('(')) return std::nullopt;
+    std::optional<std::string> name = text();
+    if (!name || !is_next(',')) return std::nullopt;
+    std::optional<std::string> type = text();
+    if (!type || !is_next(')')) return std::nullopt;
+    fields.push_back({std::move(*name), std::move(*type)});
   }
-  for (std::size_t i = 0; i + 1 < texts.size(); i += 2) fields.push_back({texts[i], texts[i + 1]});
   return fields;
 }
 
 void take_fields(std::string_view descr, std::string_view data, std::size_t count, const std::string& name,
                  FileContents& contents) {
-  const std::vector<NumpyField> fields = fields_of(descr);
+  const std::optional<std::vector<NumpyField>> fields = fields_of(descr);
+  if (!fields) return contents.refused.push_back({name, "has fields that are no single numbers"});
   std::size_t entry = 0;
-  for (const NumpyField& field : fields) {
+  for (const NumpyField& field : *fields) {
     const auto type = numpy_type(field.type);
     if (!type) return contents.refused.push_back({name, "has fields that are no numbers"});
     entry += type->size;
   }
-  if (entry == 0 || data.size() / entry < count) return contents.refused.push_back({name, kDamagedNumpy});
+  if (entry == 0 || data.size() % entry != 0 || data.size() / entry != count)
+    return contents.refused.push_back({name, kDamagedNumpy});
   std::size_t at = 0;
-  for (const NumpyField& field : fields) {
+  for (const NumpyField& field : *fields) {
     const NumpyType type = *numpy_type(field.type);
     contents.arrays.push_back({name + "." + field.name, {count}, numpy_values(data, at, entry, count, type)});
     at += type.size;
