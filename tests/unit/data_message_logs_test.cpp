@@ -5,6 +5,7 @@
 
 #include "host/input/data/byte_reader.hpp"
 #include "host/input/data/contents_guard.hpp"
+#include "host/input/data/message_columns.hpp"
 #include "host/input/data/message_logs.hpp"
 #include "host/input/data/ros_message.hpp"
 #include "tests/unit/data_test_files.hpp"
@@ -44,6 +45,18 @@ TEST(MessageLogs, ATopicThatCannotBeReadIsRefusedWithItsReason) {
   ASSERT_EQ(contents.refused.size(), 1u);
   EXPECT_EQ(contents.refused[0].name, "/camera");
   EXPECT_NE(contents.refused[0].why.find("sensor_msgs/msg/Image"), std::string::npos);
+}
+
+TEST(MessageLogs, MessagesThatAreLeftOutAreCounted) {
+  MessageColumns columns;
+  columns.add("/joint", 0, {{{"q", 1.0}}, std::nullopt});
+  columns.leave_out("/joint", "do not fit their definition");
+  columns.leave_out("/joint", "do not fit their definition");
+  columns.leave_out("/camera", "do not fit their definition");
+  const FileContents contents = columns.contents();
+  ASSERT_EQ(contents.losses.size(), 1u);  // of the other topic nothing is read at all
+  EXPECT_EQ(contents.losses[0], "2 messages of /joint are left out: they do not fit their definition");
+  EXPECT_EQ(contents.refused.size(), 2u);
 }
 
 TEST(MessageLogs, CutOnesEndInAMessageOrInWhatWasWhole) {

@@ -44,6 +44,9 @@ ArrayFile::ArrayFile(const std::filesystem::path& path, FileFormat format, Findi
     findings.fail("format", path.string(), 0, "the file " + contents_.failure,
                   is_of_matlab(format) ? "copy it again from where it was recorded, or save it again in MATLAB"
                                        : "copy it again from where it was recorded");
+  for (const std::string& loss : contents_.losses)
+    findings.add(Severity::warning, "left_out", path.string(), 0, "", loss,
+                 "record again, or save the signals that matter in a file of their own");
   name_by_labels();
   for (const NotAColumn& refused : contents_.refused) why_not_.emplace(refused.name, refused.why);
   for (const NamedText& text : contents_.texts) take_key(text.name, text.text, "is text");

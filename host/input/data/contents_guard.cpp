@@ -142,6 +142,8 @@ bool pack(const FileContents& contents, int file) {
     packer.text(refused.name);
     packer.text(refused.why);
   }
+  packer.number(contents.losses.size());
+  for (const std::string& loss : contents.losses) packer.text(loss);
   packer.text(contents.failure);
   packer.bytes(&kEndMark, 1);
   return packer.good();
@@ -178,6 +180,8 @@ bool unpack(std::string_view bytes, FileContents& contents) {
     refused.name = unpacker.text();
     refused.why = unpacker.text();
   }
+  contents.losses.resize(unpacker.count(8));
+  for (std::string& loss : contents.losses) loss = unpacker.text();
   contents.failure = unpacker.text();
   return unpacker.is_whole() && std::all_of(contents.arrays.begin(), contents.arrays.end(), fits);
 }

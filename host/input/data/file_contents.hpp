@@ -28,6 +28,7 @@ struct FileContents {
   std::vector<NamedArray> arrays;
   std::vector<NamedText> texts;
   std::vector<NotAColumn> refused;
+  std::vector<std::string> losses;  // of what the columns lack: "3 messages of /joint_states are left out: ..."
   std::string failure;  // "is cut short": ends a sentence that begins with the file; empty: it was read to its end
 };
 

@@ -30,6 +30,7 @@ constexpr std::array kKinds = {
     KindInfo{"jitter", Severity::warning, true},
     KindInfo{"conflict", Severity::error, true},
     KindInfo{"gap", Severity::warning, false},
+    KindInfo{"left_out", Severity::warning, false},
     KindInfo{"clipping", Severity::warning, false},
     KindInfo{"standstill", Severity::warning, false},
     KindInfo{"constant_column", Severity::warning, false},

@@ -50,7 +50,10 @@ class Hdf5Walk {
   void group(hid_t group, const std::string& prefix, int depth) {
     H5G_info_t info{};
     if (H5Gget_info(group, &info) < 0) return;
-    for (hsize_t i = 0; i < info.nlinks && ++objects_ <= kMostObjects; ++i) {
+    for (hsize_t i = 0; i < info.nlinks; ++i) {
+      if (objects_++ == kMostObjects)
+        contents_.losses.push_back(fmt::format("what follows the first {} objects is left out", kMostObjects));
+      if (objects_ > kMostObjects) return;
       const ssize_t length = H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, i, nullptr, 0, H5P_DEFAULT);
       if (length <= 0) continue;
       std::string name(static_cast<std::size_t>(length), '\0');

@@ -113,7 +113,7 @@ class Mcap {
     try {
       columns_.add(at->second.topic, logged_ns, at->second.read(reader.take(reader.left())));
     } catch (const DamagedFile&) {
-      columns_.refuse(at->second.topic, "has messages that do not fit their definition");
+      columns_.leave_out(at->second.topic, "do not fit their definition");
     }
   }
 

@@ -1,5 +1,7 @@
 #include "host/input/data/message_columns.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -21,6 +23,12 @@ void MessageColumns::add(const std::string& topic, std::int64_t logged_ns, const
 
 void MessageColumns::refuse(const std::string& topic, std::string why) {
   refused_.try_emplace(topic, std::move(why));
+}
+
+void MessageColumns::leave_out(const std::string& topic, std::string why) {
+  LeftOut& left_out = left_out_[topic];
+  left_out.why = std::move(why);
+  ++left_out.messages;
 }
 
 FileContents MessageColumns::contents() const {
@@ -49,6 +57,12 @@ FileContents MessageColumns::contents() const {
       else
         contents.refused.push_back({whole, "is not in every message of its topic"});
     }
+  }
+  for (const auto& [topic, left_out] : left_out_) {
+    contents.refused.push_back({topic, "has messages that " + left_out.why});
+    if (topics_.count(topic) != 0)
+      contents.losses.push_back(
+          fmt::format("{} messages of {} are left out: they {}", left_out.messages, topic, left_out.why));
   }
   for (const auto& [topic, why] : refused_) contents.refused.push_back({topic, why});
   if (contents.arrays.empty() && contents.refused.empty()) contents.failure = "holds no message";

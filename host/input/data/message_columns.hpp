@@ -21,6 +21,8 @@ class MessageColumns {
  public:
   void add(const std::string& topic, std::int64_t logged_ns, const MessageFields& fields);
   void refuse(const std::string& topic, std::string why);
+  // A message that cannot be read; of its topic the others are.
+  void leave_out(const std::string& topic, std::string why);
   // "/joint_states/time" in seconds since the first message of all, "/joint_states/effort[2]" ... A field that some
   // messages of its topic lack is refused.
   FileContents contents() const;
@@ -34,7 +36,13 @@ class MessageColumns {
 
   std::vector<std::string> order_;
   std::map<std::string, Topic> topics_;
+  struct LeftOut {
+    std::string why;
+    std::size_t messages = 0;
+  };
+
   std::map<std::string, std::string> refused_;
+  std::map<std::string, LeftOut> left_out_;
 };
 
 }  // namespace flexspline::data

@@ -90,7 +90,7 @@ class Ros1Bag {
     try {
       columns_.add(at->second.topic, seconds * 1'000'000'000 + time.u32(), at->second.type->read(data));
     } catch (const DamagedFile&) {
-      columns_.refuse(at->second.topic, "has messages that do not fit their definition");
+      columns_.leave_out(at->second.topic, "do not fit their definition");
     }
   }
 

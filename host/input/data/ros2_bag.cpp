@@ -93,7 +93,7 @@ FileContents read_ros2_bag(const std::filesystem::path& path) {
         columns.add(topic->second.name, sqlite3_column_int64(messages.get(), 1),
                     topic->second.type->read(std::string_view(data == nullptr ? "" : data, size)));
       } catch (const DamagedFile&) {
-        columns.refuse(topic->second.name, "has messages that do not fit their definition, or are compressed");
+        columns.leave_out(topic->second.name, "do not fit their definition, or are compressed");
       }
     }
     return columns.contents();
