@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "host/common/text/nearest.hpp"
+#include "host/common/text/shortened.hpp"
 #include "host/common/text/toml.hpp"
 #include "host/common/text/unit_signs.hpp"
 #include "tests/unit/data_test_files.hpp"
@@ -114,6 +115,17 @@ TEST(Toml, ANumberThatRunsIntoQuotesBeyondAsciiIsAnError) {
        {"a=\"\u00e9\"\nb.c=\"\u00e9\"\n", "d={e=\"\u00e9\",f=\"\u00e9\"}\n", "\"\u00e9\"=\"\u00e9\"\n",
         "\"a:b\"='\u00e9'\n", "g=[\"\u00e9\",\n\"\u00e9\",{h=\"\u00e9\"}]\n", "[x]\r\ni=\"\u00e9\"\r\n"})
     EXPECT_NO_THROW(parse_toml(text)) << text;
+}
+
+TEST(Shortened, IsCutBetweenCharacters) {
+  const std::string text = "\u00e4\u00f6\u00fcabc\u20ac";
+  EXPECT_EQ(beginning_of(text, 3), "\u00e4");
+  EXPECT_EQ(beginning_of(text, 4), "\u00e4\u00f6");
+  EXPECT_EQ(ending_of(text, 5), "bc\u20ac");
+  EXPECT_EQ(ending_of(text, 2), "");
+  EXPECT_EQ(beginning_of("abc", 3), "abc");
+  EXPECT_EQ(ending_of("abc", 4), "abc");
+  EXPECT_EQ(shortened(text, 3), "\u00e4... (10 more characters)");
 }
 
 TEST(UnitSigns, BecomeAsciiAndAllElseStays) {

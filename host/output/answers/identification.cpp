@@ -25,8 +25,22 @@ std::string label(const Estimate& e) {
   return fmt::format("{}.{}", e.id, e.parameter);
 }
 
-std::string shortened(const std::string& name) {
-  return name.size() <= kNameWidth ? name : name.substr(0, kNameWidth - 2) + "..";
+// As heads of columns. Where several begin alike, their ends are kept: "repo..ction-1", "repo..ction-2".
+std::vector<std::string> heads_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kBeginning = 4;
+  const auto head = [](const std::string& name) {
+    return name.size() <= kNameWidth ? name : fmt::format("{}..", text::beginning_of(name, kNameWidth - 2));
+  };
+  std::vector<std::string> heads;
+  for (const std::string& name : names) {
+    heads.push_back(head(name));
+    const bool several = std::count_if(names.begin(), names.end(),
+                                       [&](const std::string& other) { return head(other) == head(name); }) > 1;
+    if (several && name.size() > kNameWidth)
+      heads.back() = fmt::format("{}..{}", text::beginning_of(name, kBeginning),
+                                 text::ending_of(name, kNameWidth - 2 - kBeginning));
+  }
+  return heads;
 }
 
 std::vector<std::string> experiment_names(const estimation::Identification& found) {
@@ -113,6 +127,7 @@ std::string remarks(const std::vector<std::pair<std::string, const ByExperiment*
 std::string by_experiment(const estimation::Identification& found) {
   const std::vector<std::string> names = experiment_names(found);
   if (names.empty()) return {};
+  const std::vector<std::string> heads = heads_of(names);
   const auto lines = values_to_list(found);
   std::string text;
   // Side by side as far as a terminal is wide; average and spread are next to the last ones.
@@ -120,7 +135,7 @@ std::string by_experiment(const estimation::Identification& found) {
     const std::size_t last = std::min(names.size(), first + kExperimentsAbreast);
     const bool ends = last == names.size();
     std::vector<std::string> head = {"by experiment"};
-    for (std::size_t k = first; k < last; ++k) head.push_back(shortened(names[k]));
+    for (std::size_t k = first; k < last; ++k) head.push_back(heads[k]);
     if (ends) head.insert(head.end(), {"average", "std/avg"});
     Table table(head, "lr");
     for (const auto& [name, e] : lines) {
