@@ -307,5 +307,57 @@ TEST(Load, HoldoutOverridesEveryRole) {
   EXPECT_EQ(data.experiments[0].role, Role::holdout);
 }
 
+TEST(Load, TheAxisThatOneFileStatesIsThatOfAllInAnyOrder) {
+  const TestFolder folder;
+  const auto a = folder.write("a.csv", csv_of(even_times(100), {{"motor_position_rad", position}}));
+  const auto b = folder.write("b.csv", "# axis: linear\n" + csv_of(even_times(100), {{"current_a", current}}));
+  const auto toml = folder.write("c.toml",
+                                 "format = \"flexspline-dataset/1\"\n[columns.motor_position_rad]\nunit = \"mm\"\n"
+                                 "[[experiment]]\nfile = \"a.csv\"\n");
+  const double millimetre = load({b, toml}).experiments[1][Column::motor_position][50];
+  EXPECT_NEAR(millimetre, 1e-3 * position(0.05), 1e-9);
+  const Dataset data = load({toml, b});
+  EXPECT_EQ(data.experiments[0][Column::motor_position][50], millimetre);
+  EXPECT_TRUE(of_kind(data.findings, "unit").empty());
+  LoadOptions known;
+  known.axis = Axis::linear;
+  const Dataset alone = load({toml}, known);
+  EXPECT_EQ(alone.experiments[0][Column::motor_position][50], millimetre);
+  EXPECT_FALSE(alone.drive.axis);  // they do not state it
+}
+
+TEST(MergedFacts, AreThoseOfBothAndAContradictionIsAConflict) {
+  const FactSources sources{"the first", "the second", "take one"};
+  DriveFacts ours, theirs;
+  ours.gear_ratio = 100.0;
+  theirs.gear_ratio = 100.01;
+  theirs.pitch_m = 0.01;
+  theirs.axis = Axis::linear;
+  merge_facts(ours, theirs, sources, Axis::linear);
+  EXPECT_EQ(ours.gear_ratio, 100.0);
+  EXPECT_EQ(ours.pitch_m, 0.01);
+  EXPECT_EQ(ours.axis, Axis::linear);
+  const auto conflict = [&](const DriveFacts& other) -> std::string {
+    DriveFacts copy = ours;
+    try {
+      merge_facts(copy, other, sources);
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  theirs = {};
+  theirs.axis = Axis::rotary;
+  EXPECT_NE(conflict(theirs).find("axis is linear in the first and rotary in the second"), std::string::npos);
+  theirs = {};
+  theirs.pitch_m = 0.02;
+  EXPECT_NE(conflict(theirs).find("pitch_m is 0.01 in the first and 0.02 in the second"), std::string::npos);
+  // Measurements that state no axis were read as rotary.
+  theirs = {};
+  theirs.axis = Axis::linear;
+  ours = {};
+  EXPECT_NE(conflict(theirs).find("axis is rotary in the first and linear in the second"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace flexspline::data::data_toml_test

@@ -20,14 +20,6 @@ bool is_same(const data::Experiment& a, const data::Experiment& b) {
   return fs::equivalent(a.file, b.file, error) && a.size() == b.size() && a.size() > 0 && a.time_s[0] == b.time_s[0];
 }
 
-void merge_fact(std::optional<double>& ours, const std::optional<double>& theirs, const char* name) {
-  if (theirs && ours && std::abs(*ours - *theirs) > 1e-3 * std::abs(*ours))
-    throw data::DataError({{data::Severity::error, "conflict", "", 0, "",
-                            fmt::format("{} is {:g} in the data and {:g} in those held out", name, *ours, *theirs),
-                            "give measurements of one drive"}});
-  if (!ours) ours = theirs;
-}
-
 void hold_out(data::Dataset& dataset, data::Dataset held) {
   for (data::Experiment& e : held.experiments) {
     e.role = data::Role::holdout;
@@ -45,12 +37,6 @@ void hold_out(data::Dataset& dataset, data::Dataset held) {
     for (int number = 2; taken(); ++number) e.name = fmt::format("{}-{}", name, number);
     dataset.experiments.push_back(std::move(e));
   }
-  merge_fact(dataset.drive.gear_ratio, held.drive.gear_ratio, "gear_ratio");
-  merge_fact(dataset.drive.torque_constant_nm_a, held.drive.torque_constant_nm_a, "torque_constant_nm_a");
-  merge_fact(dataset.drive.pitch_m, held.drive.pitch_m, "pitch_m");
-  merge_fact(dataset.drive.pole_pairs, held.drive.pole_pairs, "pole_pairs");
-  merge_fact(dataset.drive.motor_slots, held.drive.motor_slots, "motor_slots");
-  if (!dataset.drive.axis) dataset.drive.axis = held.drive.axis;
   dataset.findings.insert(dataset.findings.end(), held.findings.begin(), held.findings.end());
 }
 
@@ -59,7 +45,15 @@ void hold_out(data::Dataset& dataset, data::Dataset held) {
 data::Dataset load(const DataInputs& inputs, Console& console) {
   console.progress("reading the measurements");
   data::Dataset dataset = data::load(inputs.data, {inputs.tolerate, false});
-  if (!inputs.holdout.empty()) hold_out(dataset, data::load(inputs.holdout, {inputs.tolerate, true}));
+  if (!inputs.holdout.empty()) {
+    // Units are converted by the axis, which one of both alone may state.
+    data::Dataset held = data::load(inputs.holdout, {inputs.tolerate, true, dataset.drive.axis});
+    if (!dataset.drive.axis && held.drive.axis == data::Axis::linear)
+      dataset = data::load(inputs.data, {inputs.tolerate, false, held.drive.axis});
+    data::merge_facts(dataset.drive, held.drive, {"the data", "those held out", "give measurements of one drive"},
+                      held.drive.axis.value_or(data::Axis::rotary));
+    hold_out(dataset, std::move(held));
+  }
   for (const std::string& text : data::warning_texts(dataset.findings)) console.warn(text);
   return dataset;
 }

@@ -91,14 +91,6 @@ std::shared_ptr<Step> of_change(std::string action, const std::string& what, con
               change.warnings, pipeline, progress);
 }
 
-void require_same(const std::optional<double>& ours, const std::optional<double>& theirs, const char* name) {
-  if (ours && theirs && std::abs(*ours - *theirs) > 1e-3 * std::abs(*ours))
-    throw data::DataError(
-        {{data::Severity::error, "conflict", "", 0, "",
-          fmt::format("{} is {:g} in these files and {:g} in the data that are open", name, *theirs, *ours),
-          "drop measurements of the same drive"}});
-}
-
 // How dropped files are read: by a dataset.toml for them, else each by its own format.
 std::vector<std::filesystem::path> recordings_of(const std::filesystem::path& folder) {
   if (std::filesystem::exists(folder / "dataset.toml")) return {folder / "dataset.toml"};
@@ -112,10 +104,10 @@ std::vector<std::filesystem::path> recordings_of(const std::filesystem::path& fo
 std::pair<std::shared_ptr<const data::Dataset>, std::string> joined(const data::Dataset& before,
                                                                     const std::filesystem::path& folder,
                                                                     const std::vector<std::string>& tolerated) {
-  data::Dataset more = data::load(recordings_of(folder), {tolerated, false});
-  require_same(before.drive.gear_ratio, more.drive.gear_ratio, "gear_ratio");
-  require_same(before.drive.torque_constant_nm_a, more.drive.torque_constant_nm_a, "torque_constant_nm_a");
+  data::Dataset more = data::load(recordings_of(folder), {tolerated, false, before.drive.axis});
   auto all = std::make_shared<data::Dataset>(before);
+  data::merge_facts(all->drive, more.drive,
+                    {"the data that are open", "these files", "drop measurements of the same drive"});
   std::string names;
   for (data::Experiment& e : more.experiments) {
     const std::string name = e.name;

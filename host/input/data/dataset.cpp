@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "host/input/data/units.hpp"
 
@@ -49,6 +51,31 @@ std::optional<Column> column_from_name(std::string_view name) {
 
 std::string unit_of(Column column, Axis axis) {
   return std::string(si_unit(quantity_of(column, axis)));
+}
+
+void merge_facts(DriveFacts& ours, const DriveFacts& theirs, const FactSources& sources, Axis our_axis) {
+  const auto refuse = [&](const char* name, const std::string& our, const std::string& their) {
+    throw DataError(
+        {{Severity::error, "conflict", "", 0, "",
+          fmt::format("{} is {} in {} and {} in {}", name, our, sources.ours, their, sources.theirs), sources.remedy}});
+  };
+  const auto word = [](Axis axis) { return axis == Axis::rotary ? "rotary" : "linear"; };
+  const Axis known = ours.axis.value_or(our_axis);
+  if (theirs.axis && *theirs.axis != known) refuse("axis", word(known), word(*theirs.axis));
+  if (!ours.axis) ours.axis = theirs.axis;
+  constexpr std::pair<const char*, std::optional<double> DriveFacts::*> kNumbers[] = {
+      {"gear_ratio", &DriveFacts::gear_ratio},
+      {"torque_constant_nm_a", &DriveFacts::torque_constant_nm_a},
+      {"pitch_m", &DriveFacts::pitch_m},
+      {"pole_pairs", &DriveFacts::pole_pairs},
+      {"motor_slots", &DriveFacts::motor_slots}};
+  for (const auto& [name, fact] : kNumbers) {
+    std::optional<double>& our = ours.*fact;
+    const std::optional<double>& their = theirs.*fact;
+    if (our && their && std::abs(*our - *their) > 1e-3 * std::abs(*our))
+      refuse(name, fmt::format("{:g}", *our), fmt::format("{:g}", *their));
+    if (!our) our = their;
+  }
 }
 
 void require(const Dataset& dataset, std::span<const std::vector<Column>> any_of_each, std::string_view task) {

@@ -107,7 +107,17 @@ struct Dataset {
 struct LoadOptions {
   std::vector<std::string> tolerate;  // kinds of findings that are warnings then, not errors
   bool holdout = false;               // every experiment is used for scoring, none for fitting (`--holdout`)
+  std::optional<Axis> axis = {};      // of the drive, where the measurements do not state it (default: rotary)
 };
+
+// Adds to `ours` what `theirs` alone states. Throws DataError of kind "conflict" where both state another value: "axis
+// is rotary in OURS and linear in THEIRS", with the remedy. Measurements that state no axis were read by `our_axis`.
+struct FactSources {
+  std::string ours;
+  std::string theirs;
+  std::string remedy;
+};
+void merge_facts(DriveFacts& ours, const DriveFacts& theirs, const FactSources& sources, Axis our_axis = Axis::rotary);
 
 // Smallest step of an encoder with so many counts, rad or m; nothing where the counts are not stated.
 std::optional<double> encoder_step(const std::optional<double>& counts, Axis axis);

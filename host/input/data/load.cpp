@@ -48,11 +48,19 @@ class Loader {
     if (paths.empty())
       findings_.fail("file", "", 0, "no measurements were given", "give files, folders or a dataset.toml");
     for (const fs::path& path : paths) read_path(path);
+    // Units were converted before a later file stated the axis.
+    if (read_without_axis_ && data_.drive.axis && *data_.drive.axis != assumed_axis()) {
+      LoadOptions known = options_;
+      known.axis = data_.drive.axis;
+      return Loader(known).load(paths);
+    }
     findings_.throw_if_errors();
     cached_.reset();  // a file's numbers take as much memory as the experiments
+    DriveFacts facts = data_.drive;
+    if (!facts.axis) facts.axis = options_.axis;
     for (Experiment& experiment : data_.experiments) {
       if (options_.holdout) experiment.role = Role::holdout;
-      check_experiment(experiment, data_.drive, findings_);
+      check_experiment(experiment, facts, findings_);
     }
     check_replicates();
     findings_.throw_if_errors();
@@ -61,6 +69,8 @@ class Loader {
   }
 
  private:
+  Axis assumed_axis() const { return options_.axis.value_or(Axis::rotary); }
+
   void read_path(const fs::path& path) {
     std::error_code error;
     if (!fs::exists(path, error))
@@ -183,7 +193,8 @@ class Loader {
     apply_experiment_keys(keys, experiment, findings_);
     make_unique(experiment);
 
-    if (read_experiment(file->table, file->plan, bounds, data_.drive.axis.value_or(Axis::rotary), experiment,
+    read_without_axis_ = read_without_axis_ || !data_.drive.axis;
+    if (read_experiment(file->table, file->plan, bounds, data_.drive.axis.value_or(assumed_axis()), experiment,
                         findings_))
       data_.experiments.push_back(std::move(experiment));
   }
@@ -210,6 +221,7 @@ class Loader {
   const LoadOptions& options_;
   Findings findings_;
   Dataset data_;
+  bool read_without_axis_ = false;  // an experiment, by the one that is assumed
   std::string cached_key_;
   std::unique_ptr<Source> cached_;
   std::set<std::string> seen_;
