@@ -173,6 +173,77 @@ TEST(Simulate, ItsFilesAreMeasurementsAgain) {
   }
 }
 
+TEST(Simulate, NeverWritesOverMeasurements) {
+  const Shell shell;
+  shell.record();
+  shell.must("flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml");
+  shell.must("flexspline simulate --model fitted.toml demo-out --out sim");
+  const std::string line = "flexspline simulate --model fitted.toml ";
+  const Answer full = shell.run(line + "demo-out --out sim");
+  EXPECT_EQ(full.code, 2);
+  EXPECT_TRUE(contains(full.err, "--force")) << full.err;
+  shell.must(line + "demo-out --out sim --force");
+  const std::string csv = shell.file("sim/free-sine-1hz.csv"), toml = shell.file("sim/dataset.toml");
+  for (const char* data : {"sim", "sim/dataset.toml", "sim/free-sine-1hz.csv"}) {
+    const Answer own = shell.run(line + data + " --out ./sim --force");
+    EXPECT_EQ(own.code, 2) << data;
+    EXPECT_TRUE(contains(own.err, "the folder of the measurements")) << own.err;
+  }
+  EXPECT_EQ(shell.file("sim/free-sine-1hz.csv"), csv);
+  EXPECT_EQ(shell.file("sim/dataset.toml"), toml);
+}
+
+TEST(Simulate, WritesTheEffortThatDroveTheModel) {
+  const Shell shell;
+  std::string csv = "time_s,current_a,motor_torque_nm,motor_position_rad\n";
+  for (int k = 0; k < 2000; ++k) {
+    const double t = 0.001 * k;
+    csv += std::to_string(t) + "," + std::to_string(std::sin(9.0 * t)) + "," + std::to_string(0.1 * std::sin(9.0 * t)) +
+           "," + std::to_string(t - 0.1 * std::sin(9.0 * t)) + "\n";
+  }
+  shell.write("run.csv", csv);
+  const std::string model = R"(format = "flexspline-model/1"
+name = "without a torque constant"
+[drive]
+axis = "rotary"
+gear_ratio = 100
+)";
+  const std::string effects = R"([[effect]]
+type = "inertia"
+parameters = { inertia = { value = 1e-3, unit = "kg*m^2" } }
+)";
+  shell.write("m.toml", model + effects);
+  shell.must("flexspline simulate --model m.toml run.csv --out sim");
+  EXPECT_TRUE(contains(shell.file("sim/run.csv"), "time_s,motor_torque_nm,"))
+      << shell.file("sim/run.csv").substr(0, 200);
+  // With the constant the current drives it, as before.
+  shell.write("m.toml", model + "torque_constant_nm_a = 0.1\n" + effects);
+  shell.must("flexspline simulate --model m.toml run.csv --out by-current");
+  EXPECT_TRUE(contains(shell.file("by-current/run.csv"), "time_s,current_a,motor_position_rad"));
+}
+
+TEST(Add, TheNextCommandsTakeTheSameDataPreparedAlike) {
+  const Shell shell;
+  shell.record();
+  shell.must("mkdir held && mv demo-out/free-sine-1hz.csv held/run.csv");
+  shell.write("demo-out/dataset.toml", "format = \"flexspline-dataset/1\"\n[drive]\ngear_ratio = 100\n");
+  const std::string how = "demo-out --holdout held --cutoff-hz 30 --mask none";
+  for (const std::string& command :
+       {"identify " + how + " --model demo-out/base-model.toml --out fitted.toml",
+        "add viscous_asymmetry --model demo-out/base-model.toml " + how + " --out more.toml"}) {
+    const std::string said = shell.must("flexspline " + command);
+    EXPECT_TRUE(contains(said, "  flexspline compare --model ")) << said;
+    std::size_t hints = 0;
+    for (std::size_t at = said.find("\n  flexspline "); at != std::string::npos;
+         at = said.find("\n  flexspline ", at + 1)) {
+      const std::string hint = said.substr(at, said.find('\n', at + 1) - at);
+      EXPECT_TRUE(contains(hint, how)) << hint;
+      ++hints;
+    }
+    EXPECT_GE(hints, 1u);
+  }
+}
+
 TEST(Output, HasNoEscapeCodesAwayFromATerminal) {
   const Shell shell;
   shell.record();

@@ -127,7 +127,8 @@ int change_model(const ChangeOptions& options, const std::string& command, const
   print(changed, what, console);
   console.line();
   console.line(fmt::format("{} holds the model. Next:", options.out.string()));
-  const std::string arguments = fmt::format("--model {} {}", quoted(options.out.string()), as_arguments(options.data));
+  const std::string arguments =
+      fmt::format("--model {} {}", quoted(options.out.string()), as_arguments(options.data, options.pipeline));
   console.line(fmt::format("  flexspline compare {}", arguments));
   console.line(fmt::format("  flexspline diagnose {}", arguments));
   write_page(options, command, dataset, file.model, changed, console);

@@ -25,9 +25,8 @@ struct DiagnoseOptions {
 constexpr std::size_t kMostRounds = 8;
 
 std::string add_command(const DiagnoseOptions& options) {
-  std::string text =
-      fmt::format("flexspline add EFFECT --model {} {}", quoted(options.model.string()), as_arguments(options.data));
-  if (!options.data.holdout.empty()) text += fmt::format(" --holdout {}", as_arguments(options.data.holdout));
+  const std::string text = fmt::format("flexspline add EFFECT --model {} {}", quoted(options.model.string()),
+                                       as_arguments(options.data, options.pipeline));
   std::filesystem::path out = options.model;
   out.replace_filename(options.model.stem().string() + "-more.toml");
   return text + fmt::format(" --out {}", quoted(out.string()));

@@ -86,8 +86,8 @@ int run(const IdentifyOptions& options, Console& console) {
     console.line();
     console.line(fmt::format("{} holds these values.", options.out.string()));
     console.line("Next:");
-    console.line(
-        fmt::format("  flexspline compare --model {} {}", quoted(options.out.string()), as_arguments(options.data)));
+    console.line(fmt::format("  flexspline compare --model {} {}", quoted(options.out.string()),
+                             as_arguments(options.data, options.pipeline)));
   }
   if (!options.report.empty())
     write_report(options.report,

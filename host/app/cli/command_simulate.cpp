@@ -24,6 +24,7 @@ struct SimulateOptions {
   DataInputs data;
   std::filesystem::path model;
   std::filesystem::path out;
+  bool force = false;
   std::string json;
 };
 
@@ -35,8 +36,7 @@ struct OutputColumn {
 // Inputs as measured, everything else from the model.
 std::vector<OutputColumn> columns_of(const Experiment& e, const simulation::FreeRun& run) {
   std::vector<OutputColumn> columns;
-  const Column effort = e.has(Column::current) ? Column::current : Column::motor_torque;
-  columns.push_back({effort, &e[effort]});
+  columns.push_back({run.effort, &e[run.effort]});
   columns.push_back({Column::motor_position, &run.motor_position});
   columns.push_back({Column::motor_velocity, &run.motor_velocity});
   columns.push_back({Column::output_position, &run.output_position});
@@ -66,7 +66,7 @@ WrittenCsv csv_of(const Experiment& e, const simulation::FreeRun& run) {
   WrittenCsv written;
   fmt::memory_buffer text;
   const auto out = std::back_inserter(text);
-  // A bar within a line would end it.
+  // A line feed in the name would end its line.
   std::string name = e.name;
   for (char& c : name)
     if (c == '\n' || c == '\r') c = ' ';
@@ -111,9 +111,26 @@ std::string dataset_head(const model::Drive& drive, const std::filesystem::path&
   return text;
 }
 
+// Even with --force: simulated files would take the place of measurements with the same names, and their dataset.toml
+// the place of the measurements' own.
+void require_no_measurements(const SimulateOptions& options, const data::Dataset& dataset) {
+  std::vector<std::filesystem::path> folders;
+  for (const std::filesystem::path& path : options.data.data)
+    folders.push_back(std::filesystem::is_directory(path) ? path : path.parent_path());
+  for (const Experiment& e : dataset.experiments) folders.push_back(e.file.parent_path());
+  for (const std::filesystem::path& folder : folders) {
+    std::error_code error;
+    if (std::filesystem::equivalent(folder.empty() ? "." : folder, options.out, error))
+      throw UsageError(fmt::format("{} is the folder of the measurements, which would be replaced; give another --out",
+                                   options.out.string()));
+  }
+}
+
 int run(const SimulateOptions& options, Console& console) {
+  require_empty_folder(options.out, options.force);
   model::Model model = load_model(options.model).model;
   const data::Dataset dataset = load(options.data, console);
+  require_no_measurements(options, dataset);
   std::vector<std::string> warnings;
   model.drive = estimation::reconcile(model.drive, dataset, warnings);
   for (const std::string& warning : warnings) console.warn(warning);
@@ -168,6 +185,7 @@ void declare(Parser& parser, SimulateOptions& options) {
   take_data(parser, options.data);
   take_model(parser, options.model);
   parser.option("--out", options.out, "folder for the simulated measurements").required().value("DIR");
+  parser.flag("--force", options.force, "write into a folder that is not empty");
 }
 
 }  // namespace

@@ -108,8 +108,14 @@ std::string tolerate_arguments(const std::vector<std::string>& kinds) {
   return text;
 }
 
-std::string as_arguments(const DataInputs& inputs) {
-  return as_arguments(inputs.data) + tolerate_arguments(inputs.tolerate);
+std::string as_arguments(const DataInputs& inputs, const PipelineInputs& pipeline) {
+  const PipelineInputs usual;
+  std::string text = as_arguments(inputs.data) + tolerate_arguments(inputs.tolerate);
+  if (!inputs.holdout.empty()) text += " --holdout " + as_arguments(inputs.holdout);
+  if (pipeline.cutoff_hz) text += fmt::format(" --cutoff-hz {}", *pipeline.cutoff_hz);
+  if (pipeline.mask != usual.mask) text += " --mask " + pipeline.mask;
+  if (pipeline.derivatives != usual.derivatives) text += " --derivatives " + pipeline.derivatives;
+  return text;
 }
 
 void require_effect(const std::string& name) {
@@ -129,6 +135,12 @@ void make_folder(const fs::path& folder) {
   if (error)
     throw UsageError(fmt::format("{}: the folder could not be created: {}; check the path and its permissions",
                                  folder.string(), error.message()));
+}
+
+void require_empty_folder(const fs::path& folder, bool force) {
+  std::error_code error;
+  if (!force && fs::is_directory(folder, error) && !fs::is_empty(folder, error))
+    throw UsageError(folder.string() + ": is there and not empty; give another folder, or --force");
 }
 
 }  // namespace flexspline::cli

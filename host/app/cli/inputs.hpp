@@ -60,12 +60,15 @@ std::string as_arguments(const std::vector<std::filesystem::path>& paths);
 std::string quoted(const std::string& argument);
 // " --tolerate KIND" for each.
 std::string tolerate_arguments(const std::vector<std::string>& kinds);
-// Measurements with what is tolerated in them, for a command that reads them again.
-std::string as_arguments(const DataInputs& inputs);
+// Measurements with what is tolerated in them, those held out and how they are prepared, for a command that reads them
+// again.
+std::string as_arguments(const DataInputs& inputs, const PipelineInputs& pipeline);
 
 // Throws UsageError with the nearest name where the catalogue has no such effect, nor is it one that users define.
 void require_effect(const std::string& name);
 
 void make_folder(const std::filesystem::path& folder);
+// Throws UsageError where `folder` is not empty and the user did not ask for that by --force.
+void require_empty_folder(const std::filesystem::path& folder, bool force);
 
 }  // namespace flexspline::cli

@@ -221,6 +221,7 @@ FreeRun run(const model::Model& model, const data::Experiment& experiment, const
   const Coupling coupling = locked ? Coupling::locked_output : two_masses ? Coupling::two_masses : Coupling::rigid;
 
   FreeRun result;
+  result.effort = effort;
   const auto signals = {&result.motor_position,  &result.motor_velocity,  &result.motor_acceleration,
                         &result.output_position, &result.output_velocity, &result.torque};
   for (auto* signal : signals) signal->assign(experiment.size(), std::numeric_limits<double>::quiet_NaN());

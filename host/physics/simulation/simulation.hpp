@@ -31,6 +31,7 @@ struct FreeRun {
   std::vector<double> output_position;
   std::vector<double> output_velocity;
   std::vector<double> torque;
+  data::Column effort = data::Column::current;  // the column that drives the model
 };
 
 // A parameter that the simulation needs has no value, or the model has no moving mass; the text names what is missing.
