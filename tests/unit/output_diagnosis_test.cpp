@@ -88,6 +88,17 @@ TEST(DiagnosisAnswer, OfSeveralRoundsNamesWhatWasAdded) {
   EXPECT_EQ(named[0].at("effect"), "gravity");
 }
 
+TEST(DiagnosisAnswer, DoesNotNameTheOnlyEffectWhereItWasRemovedAgain) {
+  selection::Diagnosis first, last;
+  first.verdict = selection::Verdict::missing_effect;
+  first.named = {{"gravity", std::nullopt}};
+  last.verdict = selection::Verdict::at_noise_floor;
+  const nlohmann::json answer = rounds_json({first, last}, {"gravity"});
+  EXPECT_TRUE(answer.at("named").empty()) << answer.at("named");
+  EXPECT_EQ(answer.at("verdict"), "at_noise_floor");
+  EXPECT_EQ(rounds_json({first}, {}).at("named").size(), 1u);
+}
+
 TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {
   const nlohmann::json possible = diagnosis_json(with_possible_effects()).at("possible");
   ASSERT_EQ(possible.size(), 2u);

@@ -222,7 +222,9 @@ json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::st
   std::erase_if(all, [&](const selection::NamedEffect& n) {
     return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
   });
-  if (!all.empty()) result["named"] = named_json(all);
+  if (rounds.size() > 1) result["named"] = named_json(all);
+  // The first round's verdict is of an effect that was removed again.
+  if (rounds.size() > 1 && all.empty()) result["verdict"] = result["rounds"].back()["verdict"];
   return result;
 }
 
