@@ -113,6 +113,83 @@ TEST(ExportCommand, AMujocoModelHasTheJointAtTheOutputSide) {
   EXPECT_NEAR(value("flexspline", "stiffness"), 8000, 1e-3);
 }
 
+// The model with another line in place of one.
+std::string model_with(std::string text, const std::string& line, const std::string& other) {
+  const std::size_t at = text.find(line);
+  EXPECT_NE(at, std::string::npos) << line;
+  return text.replace(at, line.size(), other);
+}
+
+TEST(ExportCommand, OnALinearAxisTheOutputsInertiaIsAMass) {
+  const Shell shell;
+  std::string linear =
+      model_with(kModel, "axis = \"rotary\"", "axis = \"linear\"") +
+      "[[effect]]\ntype = \"output_inertia\"\nparameters = { inertia = { value = 12.5, unit = \"kg\" } }\n";
+  for (const auto& [rotary, other] : {std::pair{"kg*m^2", "kg"},
+                                      {"N*m*s/rad", "N*s/m"},
+                                      {"N*m*s/rad", "N*s/m"},
+                                      {"N*m/rad", "N/m"},
+                                      {"\"N*m\"", "\"N\""},
+                                      {"\"N*m\"", "\"N\""},
+                                      {"\"N*m\"", "\"N\""}})
+    linear = model_with(linear, rotary, other);
+  shell.write("m.toml", linear);
+  shell.must("flexspline export --model m.toml --as mujoco --out drive.xml");
+  const std::string link = "//body[@name=\"rhs_100_link\"]/inertial";
+  EXPECT_EQ(shell.must("xmllint --xpath 'string(" + link + "/@mass)' drive.xml"), "12.5\n");
+  EXPECT_EQ(shell.must("xmllint --xpath 'string(" + link + "/@diaginertia)' drive.xml"), "1e-06 1e-06 1e-06\n");
+  shell.must("flexspline export --model m.toml --as urdf --out drive.urdf");
+  const urdf::ModelInterfaceSharedPtr robot = urdf::parseURDF(shell.file("drive.urdf"));
+  ASSERT_TRUE(robot && robot->getLink("rhs_100_link") && robot->getLink("rhs_100_link")->inertial);
+  EXPECT_EQ(robot->getLink("rhs_100_link")->inertial->mass, 12.5);
+  EXPECT_LT(robot->getLink("rhs_100_link")->inertial->izz, 1e-3);
+}
+
+TEST(ExportCommand, WithoutARatedTorqueAStiffnessThatDependsOnItIsRefused) {
+  const Shell shell;
+  const std::string unrated = model_with(kModel, "rated_torque_nm = 40.0\n", "");
+  shell.write("linear.toml", unrated);
+  const std::string page = shell.must("flexspline export --model linear.toml --as mujoco");
+  EXPECT_TRUE(contains(page, "Stiffness is the same at every torque.")) << page;
+  EXPECT_FALSE(contains(page, "half the rated torque"));
+  const std::string cubic = "[[effect]]\ntype = \"cubic_stiffness\"\nparameters = { stiffness = { value = 1e10 } }\n";
+  shell.write("cubic.toml", unrated + cubic);
+  const Answer refused = shell.run("flexspline export --model cubic.toml --as mujoco");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_TRUE(contains(refused.err, "rated_torque_nm")) << refused.err;
+  shell.write("rated.toml", kModel + cubic);
+  EXPECT_TRUE(contains(shell.must("flexspline export --model rated.toml --as mujoco"), "half the rated torque"));
+}
+
+TEST(ExportCommand, IdsThatDifferInSignsAloneKeepTablesAndMemoriesApart) {
+  const Shell shell;
+  std::string model = kModel;
+  for (const char* id : {"c+", "c-", "motor_velocity"})
+    model += std::string("[[effect]]\ntype = \"dahl_friction\"\nid = \"") + id +
+             "\"\nparameters = { torque = { value = 0.01 }, presliding = { value = 0.01 } }\n";
+  shell.write("m.toml", model);
+  shell.must("flexspline export --model m.toml --as c --out drive.h");
+  shell.write("main.c", "#include \"drive.h\"\nint main(void) { rhs_100_state s = {0}; (void)s; return 0; }\n");
+  shell.must("cc -std=c99 -Wall -Wextra -Werror -pedantic main.c -o main -lm");
+
+  std::string viscous = kModel;
+  for (const char* id : {"c+", "c-"})
+    viscous += std::string("[[effect]]\ntype = \"viscous_asymmetry\"\nid = \"") + id +
+               "\"\nparameters = { coefficient = { value = 1e-5 } }\n";
+  shell.write("v.toml", viscous);
+  shell.must("flexspline export --model v.toml --as csv --out tables");
+  EXPECT_TRUE(fs::exists(shell.folder() / "tables/effect-c_.csv"));
+  EXPECT_TRUE(fs::exists(shell.folder() / "tables/effect-c_-2.csv"));
+}
+
+TEST(ExportCommand, ANameCannotEndTheHeadersComment) {
+  const Shell shell;
+  shell.write("m.toml", model_with(kModel, "name = \"rhs-100\"", "name = \"lin */ x /* y\""));
+  shell.must("flexspline export --model m.toml --as c --out drive.h");
+  shell.write("main.c", "#include \"drive.h\"\nint main(void) { return 0; }\n");
+  shell.must("cc -std=c99 -Wall -Wextra -Werror -pedantic main.c -o main -lm");
+}
+
 TEST(ExportCommand, SaysWhatItCannotDo) {
   const Shell shell;
   shell.write("m.toml", kModel);

@@ -244,6 +244,18 @@ struct Step {
   std::vector<Term> results;            // all that a step leaves
 };
 
+// Two ids may differ in characters alone that C's names do not have, and an id may be the name of a signal.
+std::string free_name(const Step& step, const std::string& name) {
+  const auto taken = [&](const std::string& wanted) {
+    return wanted == "started" ||
+           std::any_of(step.states.begin(), step.states.end(), [&](const Variable& s) { return s.name == wanted; }) ||
+           std::any_of(std::begin(kSignals), std::end(kSignals), [&](const Signal& s) { return wanted == s.name; });
+  };
+  std::string free = name;
+  for (int number = 2; taken(free); ++number) free = fmt::format("{}_{}", name, number);
+  return free;
+}
+
 // Adds the statements of an effect, and what it remembers.
 void advance_and_evaluate(Step& step, const Placed& effect, const Inputs& before, const Term& started) {
   std::vector<Term*> terms;
@@ -251,7 +263,8 @@ void advance_and_evaluate(Step& step, const Placed& effect, const Inputs& before
   std::vector<Term> rest;
   const std::size_t first = step.states.size();
   for (std::size_t k = 0; k < terms.size(); ++k) {
-    step.states.push_back({c_name(effect.id) + (terms.size() > 1 ? fmt::format("_{}", k) : ""), {}});
+    const std::string name = c_name(effect.id) + (terms.size() > 1 ? fmt::format("_{}", k) : "");
+    step.states.push_back({free_name(step, name), {}});
     *terms[k] = step.page.input("state->" + step.states.back().name);
     rest.push_back(*terms[k]);
   }
@@ -368,6 +381,13 @@ static inline void @step(@state* state, const @inputs* in, @torques* out) {{
 #endif
 )";
 
+// A comment ends at the first "*/", and some compilers warn of "/*" within it.
+std::string comment_text(std::string text) {
+  replace_all(text, "*/", "* /");
+  replace_all(text, "/*", "/ *");
+  return text;
+}
+
 // Each name begins with the model's.
 std::string with_prefix(std::string text, const std::string& name) {
   std::string upper = name;
@@ -398,8 +418,8 @@ std::string c_header(const model::Model& model, const std::string& source) {
   find_results(step);
   const std::string body = body_text(step);
   const std::string text = fmt::format(
-      fmt::runtime(kPage), fmt::arg("model", model.name), fmt::arg("source", source),
-      fmt::arg("effects", ids_of(effects)), fmt::arg("ratio", literal(constants.gear_ratio)),
+      fmt::runtime(kPage), fmt::arg("model", comment_text(model.name)), fmt::arg("source", comment_text(source)),
+      fmt::arg("effects", comment_text(ids_of(effects))), fmt::arg("ratio", literal(constants.gear_ratio)),
       fmt::arg("km", literal(constants.torque_constant)), fmt::arg("km_unit", linear ? "N/A" : "N*m/A"),
       fmt::arg("fields", fields_text(linear)), fmt::arg("memory", memory_text(step)),
       fmt::arg("unit", linear ? "N" : "N*m"), fmt::arg("prelude", prelude_text(step)), fmt::arg("body", body));

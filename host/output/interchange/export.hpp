@@ -42,7 +42,7 @@ struct Joint {
   double velocity_limit = 0.0;        // rated, at the output
   std::vector<std::string> left_out;  // effects of which a joint knows nothing
 };
-// Throws ExportError where the rated velocity is not known.
+// Throws ExportError where the rated velocity is not known, or the rated torque of a stiffness that depends on it.
 Joint joint_of(const model::Model& model);
 // A model of MuJoCo: two hinges in a row, the motor's (armature, friction) and the transmission's (stiffness).
 std::string mujoco(const model::Model& model, const std::string& source);

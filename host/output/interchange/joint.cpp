@@ -63,6 +63,7 @@ Joint numbers_of(const model::Model& model, const catalogue::DriveConstants<doub
       const double torsion = sweeps.torsion_at(load);
       return torsion > 0.0 ? load / torsion : 0.0;
     };
+    // Without a rated torque, one for a linear stiffness, which joint_of() demands then.
     const double load = rated_torque > 0.0 ? rated_torque : 1.0;
     joint.stiffness = secant(0.5 * load);
     if (joint.stiffness > 0.0) joint.stiffness_error = std::abs(secant(load) / joint.stiffness - 1.0);
@@ -70,6 +71,23 @@ Joint numbers_of(const model::Model& model, const catalogue::DriveConstants<doub
     joint.link_damping = std::max(0.0, sweeps.torque_at_rate(rate) / rate);
   }
   return joint;
+}
+
+// Over four decades of torque: wind-up is soft at small torques, and stiffness grows at large ones.
+void require_linear_stiffness(const model::Model& model, const catalogue::DriveConstants<double>& constants) {
+  const Sweeps sweeps(model, constants);
+  if (!sweeps.has_transmission()) return;
+  constexpr double kLowest = 0.1, kHighest = 1000.0, kSame = 0.01;
+  double first = 0.0;
+  for (double load = kLowest; load <= kHighest; load *= 10.0) {
+    const double torsion = sweeps.torsion_at(load);
+    if (!(torsion > 0.0)) continue;
+    if (first == 0.0) first = load / torsion;
+    if (std::abs(load / torsion / first - 1.0) > kSame)
+      throw ExportError(
+          "the stiffness of a joint is the secant at half the rated torque, which the model does not state, and its "
+          "stiffness depends on the torque; add rated_torque_nm to its [drive]");
+  }
 }
 
 bool differs(double a, double b) {
@@ -86,6 +104,7 @@ Joint joint_of(const model::Model& model) {
   const auto constants = catalogue::constants_of(model.drive);
   const double fastest = *model.drive.rated_velocity_rad_s.value;
   const double rated = model.drive.rated_torque_nm.value.value_or(0.0);
+  if (!(rated > 0.0)) require_linear_stiffness(model, constants);
   Joint joint = numbers_of(model, constants, fastest, rated);
   joint.torque_limit = rated;
   joint.velocity_limit = fastest / constants.gear_ratio;

@@ -42,8 +42,11 @@ std::string said_of(const model::Model& model, const Joint& joint, const std::st
       model.name, source, joint.friction_error, linear ? "N" : "N m");
   if (joint.stiffness > 0.0)
     text +=
-        fmt::format("\n     Stiffness is the secant at half the rated torque; at the rated torque it is {:.2g} % off.",
-                    100.0 * joint.stiffness_error);
+        joint.torque_limit > 0.0
+            ? fmt::format(
+                  "\n     Stiffness is the secant at half the rated torque; at the rated torque it is {:.2g} % off.",
+                  100.0 * joint.stiffness_error)
+            : "\n     Stiffness is the same at every torque.";
   if (!left_out.empty()) text += "\n     A joint knows nothing of: " + left_out + ".";
   return comment_safe(text);
 }
@@ -51,6 +54,21 @@ std::string said_of(const model::Model& model, const Joint& joint, const std::st
 // Links need some mass for an engine to start; it is small compared with any arm.
 constexpr const char* kSmallMass = "0.001";
 constexpr const char* kSmallInertia = "1e-06";
+
+struct Inertial {
+  std::string mass = kSmallMass;
+  std::string inertia = kSmallInertia;
+};
+
+// Of the link: on a linear axis the model's inertia is a mass, and the mass resists the motion.
+Inertial inertial_of(const Joint& joint, bool linear) {
+  Inertial link;
+  if (!(joint.output_inertia > 0.0)) return link;
+  const std::string value = fmt::format("{:.9g}", joint.output_inertia);
+  link.mass = linear ? value : "1";
+  if (!linear) link.inertia = value;
+  return link;
+}
 
 std::string urdf_link(const std::string& name, const std::string& which, const std::string& mass,
                       const std::string& inertia) {
@@ -105,11 +123,12 @@ std::string urdf_transmission(const Joint& joint, const std::string& name) {
 std::string mujoco(const model::Model& model, const std::string& source) {
   const Joint joint = joint_of(model);
   const std::string name = c_name(model.name);
-  const char* const type = model.drive.axis == data::Axis::linear ? "slide" : "hinge";
+  const bool linear = model.drive.axis == data::Axis::linear;
+  const char* const type = linear ? "slide" : "hinge";
   const bool elastic = joint.stiffness > 0.0;
-  const std::string inertia = joint.output_inertia > 0.0 ? fmt::format("{:.9g}", joint.output_inertia) : kSmallInertia;
-  const std::string link = fmt::format(R"(<inertial pos="0 0 0" mass="{}" diaginertia="{} {} {}"/>)",
-                                       joint.output_inertia > 0.0 ? "1" : kSmallMass, inertia, inertia, inertia);
+  const auto [mass, inertia] = inertial_of(joint, linear);
+  const std::string link =
+      fmt::format(R"(<inertial pos="0 0 0" mass="{}" diaginertia="{} {} {}"/>)", mass, inertia, inertia, inertia);
   std::string bodies;
   if (elastic)
     bodies = fmt::format(
@@ -152,7 +171,7 @@ std::string urdf(const model::Model& model, const std::string& source) {
   const std::string name = c_name(model.name);
   const bool linear = model.drive.axis == data::Axis::linear;
   const bool elastic = joint.stiffness > 0.0;
-  const std::string inertia = joint.output_inertia > 0.0 ? fmt::format("{:.9g}", joint.output_inertia) : kSmallInertia;
+  const auto [mass, inertia] = inertial_of(joint, linear);
   const std::string limit =
       joint.torque_limit > 0.0
           ? fmt::format("    <limit lower=\"-1e9\" upper=\"1e9\" effort=\"{:.9g}\" velocity=\"{:.9g}\"/>\n",
@@ -166,7 +185,7 @@ std::string urdf(const model::Model& model, const std::string& source) {
                                  escaped(said_of(model, joint, source)));
   text += fmt::format("  <link name=\"{}_base\"/>\n", name);
   if (elastic) text += urdf_link(name, "rotor", kSmallMass, kSmallInertia);
-  text += urdf_link(name, "link", joint.output_inertia > 0.0 ? "1" : kSmallMass, inertia);
+  text += urdf_link(name, "link", mass, inertia);
   text += fmt::format(
       R"(  <joint name="{name}_motor" type="{type}">
     <parent link="{name}_base"/>

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -129,7 +130,14 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const model::Model& 
            text;
     for (std::size_t k = 0; k < x.size(); ++k)
       text += fmt::format("{:.9g},{:.9g},{:.9g}\n", x[k], forward[k], backward[k]);
-    files.emplace_back("effect-" + c_name(effect.id) + ".csv", text);
+    // Two ids may differ in characters alone that a file's name does not hold.
+    const std::string name = "effect-" + c_name(effect.id);
+    std::string file = name + ".csv";
+    const auto taken = [&] {
+      return std::any_of(files.begin(), files.end(), [&](const auto& other) { return other.first == file; });
+    };
+    for (int number = 2; taken(); ++number) file = fmt::format("{}-{}.csv", name, number);
+    files.emplace_back(file, text);
   }
   return files;
 }
