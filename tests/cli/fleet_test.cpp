@@ -99,6 +99,18 @@ TEST(Fleet, AJobThatWasKilledOrNeverRanCountsAsADriveWithoutAResult) {
   EXPECT_TRUE(shell.json("flexspline fleet merge drives")["failed"].empty());
 }
 
+TEST(Fleet, ADriveIsDoneAgainWhereARecordingInAnotherFolderChanged) {
+  const Shell shell;
+  shell.write("plan.toml", kPlan);
+  shell.must("flexspline-hil record --plan plan.toml --seed 1 --out raw");
+  shell.must("rm raw/dataset.toml");
+  shell.must("flexspline new --from raw --out project");
+  shell.must("flexspline fleet run project");
+  EXPECT_TRUE(contains(shell.must("flexspline fleet run project"), "done before"));
+  shell.must("sed -i 's/^# load: free/# load: free\\n# a comment/' raw/slow.csv && grep -q 'a comment' raw/slow.csv");
+  EXPECT_FALSE(contains(shell.must("flexspline fleet run project"), "done before"));
+}
+
 TEST(Fleet, SaysWhatIsWrong) {
   const Shell shell;
   EXPECT_EQ(shell.run("flexspline fleet run nowhere").code, 2);

@@ -13,6 +13,7 @@
 #include "host/engine/comparison/compare.hpp"
 #include "host/engine/estimation/estimate.hpp"
 #include "host/engine/selection/diagnosis.hpp"
+#include "host/input/data/dataset_toml.hpp"
 #include "host/input/data/recording.hpp"
 #include "host/output/answers/comparison.hpp"
 #include "host/output/answers/diagnosis.hpp"
@@ -58,6 +59,28 @@ struct Task {
   std::string fingerprint;  // of all that the result depends on
 };
 
+// All that is read where the folder is the data: its recordings, or dataset.toml with those that it names, which may be
+// in other folders.
+std::vector<fs::path> measurements_of(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && (data::is_recording(entry.path()) || entry.path().filename() == "dataset.toml"))
+      files.push_back(entry.path());
+  const fs::path toml = folder / "dataset.toml";
+  std::error_code error;
+  try {
+    data::Findings ignored;
+    if (fs::exists(toml, error))
+      for (const data::ExperimentEntry& entry : data::read_dataset_toml(toml, ignored).experiments)
+        if (fs::is_regular_file(entry.file, error)) files.push_back(entry.file);
+  } catch (const data::DataError&) {
+    // The run reports it.
+  }
+  std::sort(files.begin(), files.end());
+  files.erase(std::unique(files.begin(), files.end()), files.end());
+  return files;
+}
+
 Task task_of(const FleetOptions& options, const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
@@ -73,16 +96,10 @@ Task task_of(const FleetOptions& options, const fs::path& folder) {
   if (!fs::exists(task.model, error))
     throw UsageError(fmt::format("there is no model {}; give --model MODEL, or put base-model.toml into the folder",
                                  task.model.string()));
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && (data::is_recording(entry.path()) || entry.path().filename() == "dataset.toml"))
-      files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
   std::string all = fmt::format("{} {} {} {}", text::tool_name(), options.diagnose,
                                 options.pipeline.cutoff_hz.value_or(0.0), fmt::join(options.tolerate, ","));
   all += hash_of(content_of(task.model));
-  for (const fs::path& file : files) all += file.filename().string() + hash_of(content_of(file));
+  for (const fs::path& file : measurements_of(folder)) all += file.filename().string() + hash_of(content_of(file));
   task.fingerprint = hash_of(all);
   return task;
 }
