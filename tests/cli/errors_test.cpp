@@ -105,5 +105,18 @@ TEST(BadInput, AFolderThatIsInTheWayIsNotWrittenOver) {
   shell.must("flexspline new --from demo-out --out project --force");
 }
 
+TEST(BadInput, OptionsOfAUserDefinedEffectAreRefusedForOneOfTheCatalogue) {
+  const Shell shell;
+  shell.write("model.toml", kModel);
+  shell.write("data.csv", records(400));
+  for (const char* const option : {"--formula", "--parameter", "--points", "--balance"}) {
+    const std::string value = option == std::string_view("--points") ? " 7 " : " a:b ";
+    expect_refusal(
+        shell, "flexspline add viscous_asymmetry " + (option + value) + "--model model.toml data.csv --out new.toml",
+        {option, "viscous_asymmetry", "table_effect"});
+  }
+  EXPECT_FALSE(fs::exists(shell.folder() / "new.toml"));
+}
+
 }  // namespace
 }  // namespace flexspline::cli_test::errors_test

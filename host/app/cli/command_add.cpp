@@ -136,13 +136,29 @@ int change_model(const ChangeOptions& options, const std::string& command, const
   return kDone;
 }
 
+void require_no_definition(const AddOptions& options) {
+  const selection::UserDefinition& d = options.user_defined;
+  const char* const given = !d.formula.empty()      ? "--formula"
+                            : !d.parameters.empty() ? "--parameter"
+                            : d.points              ? "--points"
+                            : !d.balance.empty()    ? "--balance"
+                                                    : nullptr;
+  if (given != nullptr)
+    throw UsageError(
+        fmt::format("{} is of table_effect and expression_effect; {} is an effect of the catalogue, "
+                    "leave the option out",
+                    given, options.effect));
+}
+
 int run(const AddOptions& options, Console& console) {
   require_effect(options.effect.substr(0, options.effect.find(':')));
   // A wrong name is reported before files are read.
   if (selection::names_user_defined_effect(options.effect))
     selection::user_defined_effect(options.effect, options.user_defined, {});
-  else
+  else {
     selection::parse_effect(options.effect);
+    require_no_definition(options);
+  }
   return change_model(
       options, "add", fmt::format("{} added", options.effect),
       [&](const data::Dataset& dataset, const model::Model& model) {
