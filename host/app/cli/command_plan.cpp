@@ -147,7 +147,7 @@ Command plan_command() {
        "effect's torque that the model with the other cannot reproduce, over the noise. Without it, motions that "
        "determine all parameters best. Measurements, where given, give the noise, the sizes of the effects and what "
        "need not be recorded again. If no motion distinguishes two effects, the answer says so. The plan is a TOML "
-       "file that flexspline-hil record --plan runs on the twin.",
+       "file that flexspline record --plan runs on a drive or the twin.",
        {kMakeData, kIdentify,
         "flexspline plan --separate stribeck_gaussian,load_dependent_friction --model fitted.toml --out "
         "plan.toml"}},
