@@ -87,7 +87,7 @@ void dispatch_order(int order, const Sections& sections, std::size_t n, std::siz
   ((order == Less + 1 ? filter_blocks<Less + 1>(sections, n, pad, block, warm, columns, work) : void()), ...);
 }
 
-// From rounding on, a state that decayed three times to a millionth is rounding.
+// In pads, over each of which the filter's state decays to a millionth: after three, only rounding is left of it.
 constexpr std::size_t kForgotten = 3;
 
 }  // namespace

@@ -85,7 +85,8 @@ std::string read_text(const std::filesystem::path& path, Findings& findings) {
       findings.fail("format", file, 0, fmt::format("the file holds no text from byte {} on, only zeros", before),
                     "it was not written to its end: copy it again, or cut it there");
     if (packed && text.size() > kMostInflation * size + kHead)
-      findings.fail("format", file, 0, "the compressed file would grow beyond all measurements", "unpack it yourself");
+      findings.fail("format", file, 0, "the compressed file is far longer than any recording when it is unpacked",
+                    "unpack it yourself");
   }
   if (got < 0)
     findings.fail("format", file, 0, "the compressed file is damaged or cut short",

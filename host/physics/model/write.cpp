@@ -18,7 +18,7 @@ std::string_view comment(std::string_view key, data::Axis axis) {
       {"pole_pairs", "of the motor"},
       {"motor_slots", "of the motor's stator"},
   };
-  if (axis == data::Axis::linear && key == "torque_constant_nm_a") return "N/A on this axis";
+  if (axis == data::Axis::linear && key == "torque_constant_nm_a") return "N per A on this axis";
   if (axis == data::Axis::linear && key == "rated_velocity_rad_s") return "m/s on this axis";
   if (axis == data::Axis::linear && key == "rated_torque_nm") return "N on this axis";
   for (const auto& [name, text] : kComments)
