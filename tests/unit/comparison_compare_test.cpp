@@ -230,6 +230,13 @@ TEST(Compare, JsonHasTheFieldsOfItsFormatAndNullForWhatIsNotKnown) {
   EXPECT_EQ(j["overall"][0]["noise_floor_from"], "propagated");
 }
 
+TEST(Compare, TableLeavesWarningsToStandardError) {
+  Comparison found = compare(compared().dataset, compared().model, {});
+  found.warnings.emplace_back("a warning of its own");
+  EXPECT_EQ(output::comparison_table(found).find("a warning of its own"), std::string::npos);
+  EXPECT_EQ(output::comparison_json(found)["warnings"].back(), "a warning of its own");
+}
+
 TEST(Compare, TableHasTheWorstExperimentFirstAndThreeRegionsInWords) {
   model::Model wrong = compared().model;
   *wrong.find("linear_stiffness")->find("stiffness")->value *= 1.2;

@@ -131,7 +131,6 @@ std::string comparison_table(const Comparison& comparison) {
   for (const Region* r : printed)
     if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall);
   if (!comparison.baselines.empty()) text += baseline_table(comparison.baselines);
-  for (const std::string& warning : comparison.warnings) text += fmt::format("warning: {}\n", warning);
   return text;
 }
 
