@@ -94,6 +94,18 @@ TEST_F(WorkbenchApi, SaysHowGoodTheModelIsByExperiment) {
   EXPECT_EQ(state["experiments"][0]["signals"][0]["free_run"], false);
 }
 
+// A file's name in Latin-1 is the name of its experiment.
+TEST_F(WorkbenchApi, ShowsAnExperimentWhoseNameIsNoUtf8) {
+  auto dataset = std::make_shared<data::Dataset>(*first()->dataset);
+  dataset->experiments[0].name = "fr\xE4sen";
+  model::ModelFile file{first()->model, first()->model_text};
+  struct Setup setup;
+  setup.first = open(dataset, file, {}, [](std::string_view) {});
+  setup.folder = folder_;
+  api_ = std::make_unique<Api>(std::move(setup));
+  EXPECT_EQ(settled(new_tab())["experiments"][0]["name"], "fr\xEF\xBF\xBDsen");
+}
+
 // A page that hears of a work only when it is over still learns that there was one.
 TEST_F(WorkbenchApi, CountsTheWorksThatWereStarted) {
   const std::string tab = new_tab();

@@ -42,6 +42,11 @@ void require_text(std::string_view value, std::string_view what) {
   if (value.find('\0') != value.npos) throw UnknownNameError(fmt::format("{} holds a byte that is not text", what));
 }
 
+// Names of experiments may be of files whose names are no UTF-8.
+std::string text_of(const json& answer) {
+  return answer.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 const std::string& text(const Request& request, const std::string& key) {
   const auto found = request.query.find(key);
   if (found == request.query.end()) throw UnknownNameError(fmt::format("\"{}\" is missing in the request", key));
@@ -147,9 +152,9 @@ Answer Api::answer(const Request& request) {
     if (computes) refuse_deadly_job(key);
     if (request.method == "GET" && request.path == "/api/file") return file(request);
     if (request.method == "GET")
-      answer.body = get(request).dump();
+      answer.body = text_of(get(request));
     else if (request.method == "POST")
-      answer.body = post(request).dump();
+      answer.body = text_of(post(request));
     else
       throw NotFound("only GET and POST are known");
   } catch (const NotFound& error) {
@@ -166,7 +171,7 @@ Answer Api::answer(const Request& request) {
     answer.body = reply_of("there is not enough memory for it; take shorter records, or fewer").dump();
   } catch (const std::exception& error) {
     answer.status = 400;
-    answer.body = reply_of(error.what()).dump(-1, ' ', false, json::error_handler_t::replace);
+    answer.body = text_of(reply_of(error.what()));
   }
   return answer;
 }
