@@ -76,6 +76,17 @@ std::optional<double> range_of(effects::Variable variable, const model::Model& m
   return std::nullopt;
 }
 
+// Two ids may differ in characters alone that a file's name does not hold.
+std::string free_file_name(const std::string& id, const std::vector<std::pair<std::string, std::string>>& files) {
+  const std::string name = "effect-" + c_name(id);
+  std::string file = name + ".csv";
+  const auto taken = [&] {
+    return std::any_of(files.begin(), files.end(), [&](const auto& other) { return other.first == file; });
+  };
+  for (int number = 2; taken(); ++number) file = fmt::format("{}-{}.csv", name, number);
+  return file;
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> csv_tables(const model::Model& model) {
@@ -130,14 +141,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const model::Model& 
            text;
     for (std::size_t k = 0; k < x.size(); ++k)
       text += fmt::format("{:.9g},{:.9g},{:.9g}\n", x[k], forward[k], backward[k]);
-    // Two ids may differ in characters alone that a file's name does not hold.
-    const std::string name = "effect-" + c_name(effect.id);
-    std::string file = name + ".csv";
-    const auto taken = [&] {
-      return std::any_of(files.begin(), files.end(), [&](const auto& other) { return other.first == file; });
-    };
-    for (int number = 2; taken(); ++number) file = fmt::format("{}-{}.csv", name, number);
-    files.emplace_back(file, text);
+    files.emplace_back(free_file_name(effect.id, files), text);
   }
   return files;
 }
