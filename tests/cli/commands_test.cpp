@@ -154,6 +154,16 @@ TEST(Compare, ALimitDecidesTheExitCode) {
   EXPECT_TRUE(contains(above.err, "motor_balance")) << above.err;
 }
 
+TEST(Identify, HeadsOfExperimentsWhoseNamesBeginAlikeDiffer) {
+  const Shell shell;
+  shell.record();
+  shell.must(
+      "mkdir two && grep -v '^# experiment' demo-out/free-sine-1hz.csv >two/report-friction-1.csv && "
+      "cp two/report-friction-1.csv two/report-friction-2.csv");
+  const std::string text = shell.must("flexspline identify two --model demo-out/base-model.toml");
+  EXPECT_TRUE(contains(text, "  repo..ction-1  repo..ction-2  ")) << text;
+}
+
 TEST(Simulate, ItsFilesAreMeasurementsAgain) {
   const Shell shell;
   shell.record();

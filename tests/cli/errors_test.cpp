@@ -118,5 +118,14 @@ TEST(BadInput, OptionsOfAUserDefinedEffectAreRefusedForOneOfTheCatalogue) {
   EXPECT_FALSE(fs::exists(shell.folder() / "new.toml"));
 }
 
+TEST(BadInput, HeldOutDataOfAnotherAxisAreRefused) {
+  const Shell shell;
+  shell.write("model.toml", kModel);
+  shell.write("data.csv", "# axis: rotary\n" + records(400));
+  shell.write("held.csv", "# axis: linear\n" + records(400));
+  expect_refusal(shell, "flexspline identify data.csv --model model.toml --holdout held.csv",
+                 {"axis is rotary in the data and linear in those held out"});
+}
+
 }  // namespace
 }  // namespace flexspline::cli_test::errors_test
