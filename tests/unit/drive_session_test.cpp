@@ -2,13 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/drive_link/drive/dataset_writer.hpp"
 #include "host/drive_link/drive/recorder.hpp"
 #include "host/drive_link/drive/silence.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/loopback.hpp"
+#include "tests/support/two_ampere_drive.hpp"
 
 namespace flexspline::drive::drive_session_test {
 namespace {
@@ -60,6 +65,27 @@ TEST(Session, FlashesThroughLostAnswersOfEveryKind) {
     EXPECT_TRUE(std::ranges::equal(drive.store().active(), block)) << static_cast<int>(kind);
     EXPECT_EQ(drive.store().sequence(), 5U) << "once, and not twice";
   }
+}
+
+TEST(Session, ADriveThatHasJustStartedIsAskedAgainUntilItsShaftIsSeenToStand) {
+  for (const Kind kind : {Kind::block_begin, Kind::block_erase_all}) {
+    int times = 3;
+    twin::TwinDrive drive({.drive = demo()});
+    Session session = open_session(drive, [&](protocol::Message& m) {
+      if (m.request() == kind && times-- > 0) m.code = static_cast<std::uint8_t>(protocol::Code::moving);
+      return false;
+    });
+    if (kind == Kind::block_begin) session.write_block(other_block());
+    if (kind == Kind::block_erase_all) session.erase_all_blocks();
+    EXPECT_LE(times, 0) << static_cast<int>(kind);
+  }
+  // One that turns refuses in the end.
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive, [](protocol::Message& m) {
+    if (m.request() == Kind::block_begin) m.code = static_cast<std::uint8_t>(protocol::Code::moving);
+    return false;
+  });
+  EXPECT_NE(error_of([&] { session.write_block(other_block()); }).find("the shaft turns"), std::string::npos);
 }
 
 TEST(Session, ARestoreWhoseAnswerGotLostIsDoneOnce) {
