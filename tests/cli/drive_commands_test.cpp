@@ -298,6 +298,24 @@ TEST(Record, WhatWasRecordedIdentifiesTheDrive) {
   EXPECT_NEAR(value("coulomb_friction", "torque"), 0.045, 0.001);
 }
 
+TEST(Record, ForceDoesNotHideOtherRecordingsOfTheFolder) {
+  const Shell shell;
+  shell.write("two.toml", plan_of(run_of("a", kSine) + run_of("b", kSine)));
+  shell.write("kept/dataset.toml",
+              "format = \"flexspline-dataset/1\"\n[[experiment]]\nfile = \"a.csv\"\n[[experiment]]\n"
+              "file = \"b.csv\"\n");
+  shell.write("plain/mine.csv", "time_s,current_a\n0,0\n");
+  const auto refusal = [&](const std::string& arguments) {
+    const Answer answer = shell.run("flexspline record --force --plan two.toml --drive tcp:127.0.0.1:1 " + arguments);
+    EXPECT_EQ(answer.code, 2);
+    return answer.err;
+  };
+  EXPECT_TRUE(contains(refusal("--runs a --out kept"), "kept: has the measurement b.csv"));
+  EXPECT_TRUE(contains(refusal("--out plain"), "plain: has the measurement mine.csv"));
+  // All of them again: only the drive is missing.
+  EXPECT_FALSE(contains(refusal("--out kept"), "has the measurement"));
+}
+
 TEST(Record, OverASerialLineIsTheSame) {
   const Shell shell;
   shell.write("plan.toml", plan_of(run_of("short",

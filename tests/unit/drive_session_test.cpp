@@ -153,6 +153,72 @@ TEST(Recorder, RecordsARunAndLeavesTheDriveAtRest) {
   EXPECT_NEAR(most - least, 6.37, 0.4);
 }
 
+TEST(Recorder, PositionsOfALinearAxisAreInMetres) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive);
+  Scales scales = scales_of(session);
+  // As the block of an axis with a pitch of 10 mm; its velocities stay what they are.
+  scales.header.axis = 1;
+  scales.constants.turn_angle_scale = kTurn / 0.01;
+  planning::Run run;
+  run.name = "sine", run.waveform = planning::Waveform::sine;
+  run.amplitude = 40.0, run.frequency_hz = 2.0, run.duration_s = 1.5;
+  planning::Plan plan = plan_of(run);
+  plan.limits.velocity_rad_s = 40.0;
+  const Recording r = Recorder(session, scales, plan).record(run, {});
+  EXPECT_TRUE(r.complete) << r.ended;
+  const auto [least, most] = std::ranges::minmax(r.motor_position_rad);
+  EXPECT_NEAR(most - least, 6.37 / kTurn * 0.01, 0.4 / kTurn * 0.01);
+  for (std::size_t k = 0; k < r.time_s.size(); ++k)
+    EXPECT_NEAR(r.output_position_rad[k], r.motor_position_rad[k] / 100.0, 0.003 / kTurn * 0.01);
+}
+
+TEST(Recorder, SetPointsOfALinearAxisAreInMetres) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive);
+  Scales scales = scales_of(session);
+  scales.constants.turn_angle_scale = kTurn / 0.01;
+  planning::Run run;
+  run.mode = planning::Mode::position, run.waveform = planning::Waveform::zero;
+  run.offset = 0.02, run.duration_s = 10.0;
+  PositionMotion motion(run, {}, scales);
+  motion.start_at(0);
+  EXPECT_NEAR(std::ldexp(static_cast<double>(motion.at(5.0, 0.02).position), -32), 2.0, 1e-9) << "turns";
+}
+
+TEST(Recorder, OnlyWhatADriveMeasuresIsInItsFile) {
+  Recording r;
+  r.run.name = "run";
+  r.time_s = {0.0}, r.current_a = {1.0}, r.motor_position_rad = {2.0}, r.output_position_rad = {3.0};
+  r.torque_nm = {4.0}, r.temperature_c = {5.0}, r.command = {6.0};
+  const Scales scales = *scales_of(twin::factory_block(demo()));
+  const std::string all = csv_of(r, scales, {});
+  EXPECT_NE(all.find("output_position_rad,torque_nm,temperature_c"), std::string::npos) << all;
+  EXPECT_NE(all.find("\n0,1,2,3,4,5,6\n"), std::string::npos) << all;
+  EXPECT_NE(all.find("# motor_position_zero: absolute\n# output_position_zero: absolute\n"), std::string::npos) << all;
+  const std::string few =
+      csv_of(r, scales, {}, {.output = false, .torque = false, .knows_turn = false, .knows_output = false});
+  EXPECT_NE(few.find("motor_position_rad,temperature_c"), std::string::npos) << few;
+  EXPECT_NE(few.find("\n0,1,2,5,6\n"), std::string::npos) << few;
+  EXPECT_NE(few.find("# motor_position_zero: none\n"), std::string::npos) << few;
+  EXPECT_EQ(few.find("output_position_zero"), std::string::npos) << few;
+  const std::string unknown = csv_of(r, scales, {}, {.knows_turn = false, .knows_output = false});
+  EXPECT_NE(unknown.find("# output_position_zero: none\n"), std::string::npos) << unknown;
+}
+
+TEST(Recorder, WhatADriveMeasuresIsInItsBlock) {
+  const Measures both = measures_of(twin::factory_block(demo()));
+  EXPECT_TRUE(both.output);
+  EXPECT_TRUE(both.torque);
+  deployment::PackOptions options;
+  options.samples = 300;
+  options.tick_hz = 20'000;
+  options.settings = "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 4096\n";
+  const Measures none = measures_of(deployment::pack(tests::two_ampere_drive(), options).bytes);
+  EXPECT_FALSE(none.output);
+  EXPECT_FALSE(none.torque);
+}
+
 TEST(Recorder, StopsWhenItIsToldToAndBrakesTheShaft) {
   twin::TwinDrive drive({.drive = demo()});
   Session session = open_session(drive);
