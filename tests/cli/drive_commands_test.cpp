@@ -190,6 +190,35 @@ TEST(Flash, RefusesWhatDoesNotFitAndTheDriveKeepsItsBlock) {
   EXPECT_EQ(sha_of(shell, twin), made);
 }
 
+TEST(Flash, OptionsOfAModelAreRefusedWithABlock) {
+  const Shell shell;
+  for (const char* option : {"--settings missing.toml", "--measured", "--draws 8"}) {
+    const Answer answer = shell.run(std::string("flexspline flash --drive twin --block f.block ") + option);
+    EXPECT_EQ(answer.code, 2) << option;
+    EXPECT_TRUE(contains(answer.err, "--block")) << answer.err;
+    EXPECT_TRUE(contains(answer.err, std::string(option).substr(0, 6))) << answer.err;
+  }
+}
+
+TEST(Flash, ABlockForAnotherDriveIsNotFlashedWithoutAWarning) {
+  const Shell shell;
+  shell.write("a.toml", model_with(1.0));
+  shell.write("drive.toml",
+              "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 16384\n[output_encoder]\n"
+              "counts = 262144\n[torque_sensor]\n");
+  const TwinProcess twin({"--serve", "0"});
+  const std::string drive = " --drive " + twin.name();
+  const auto warning_for = [&](const std::string& name) {
+    shell.must("flexspline pack --model a.toml --drive drive.toml --out x.block --for-drive " + twin.name() +
+               " --drive-name " + name);
+    const Answer answer = shell.run("flexspline flash --block x.block" + drive);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return contains(answer.err, "was packed for drive \"" + name + "\"");
+  };
+  EXPECT_TRUE(warning_for("axis-3"));
+  EXPECT_FALSE(warning_for("TWIN"));
+}
+
 TEST(Flash, WhatWasFlashedOutlastsAPowerCutAndOneInTheMiddleLeavesOldOrNew) {
   const Shell shell;
   shell.write("a.toml", model_with(1.0));
