@@ -1,6 +1,9 @@
 // pack and unpack as a user runs them.
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+
 #include "tests/cli/tool.hpp"
 
 namespace flexspline::cli_test::pack_test {
@@ -91,6 +94,21 @@ TEST(PackCommand, RefusesWhatDoesNotFitAndWritesNothing) {
   EXPECT_EQ(image.code, 2);
   EXPECT_TRUE(contains(image.err, "stribeck_gaussian does not fit: the firmware image lacks it")) << image.err;
   EXPECT_EQ(shell.run("test -e b.block").code, 1);
+}
+
+TEST(PackCommand, RefusesOptionsThatWouldNotBeUsed) {
+  const Shell shell;
+  shell.write("m.toml", kModel);
+  shell.write("d.toml", "format = \"flexspline-drive/1\"\n");
+  for (const auto& [options, named] :
+       {std::pair{"--drive d.toml --encoder-counts 4096 --filter-corner-hz 90", "--drive"},
+        std::pair{"--filter-corner-hz 90", "--encoder-counts"},
+        std::pair{"--for-drive twin --tick-hz 9000", "--tick-hz"},
+        std::pair{"--for-drive twin --image inertia", "--image"}}) {
+    const Answer answer = shell.run(std::string("flexspline pack --model m.toml --out b.block ") + options);
+    EXPECT_EQ(answer.code, 2) << options;
+    EXPECT_TRUE(contains(answer.err, named)) << answer.err;
+  }
 }
 
 TEST(UnpackCommand, SaysWhatIsWrongWithABlock) {

@@ -340,5 +340,29 @@ TEST(Pack, ProvesItsParts) {
   EXPECT_GT(packed.max_error_share_of_rated, 0.0);
 }
 
+TEST_F(Block, LongIdsThatBeginAlikeStayDifferent) {
+  model::Model m = drive_with({"inertia", "viscous_friction", "coulomb_friction"});
+  const std::string beginning(63, 'a');
+  m.effects[0].id = beginning + "\u00e9 one";
+  m.effects[1].id = beginning + "\u00e9 two";
+  const auto unpacked = deployment::unpack(deployment::pack(m, quick()).bytes);
+  ASSERT_TRUE(unpacked.model);
+  ASSERT_EQ(unpacked.model->effects.size(), 3u);
+  // No character of two bytes is cut in two.
+  EXPECT_EQ(unpacked.model->effects[0].id, beginning);
+  EXPECT_EQ(unpacked.model->effects[1].id, beginning.substr(0, 62) + "~2");
+}
+
+TEST_F(Block, TorquesThatNoBasesHoldAreRefusedWithTheLargestThatTheyHold) {
+  model::Model m = drive_with({"inertia", "coulomb_friction"});
+  m.effects[1].parameters[0].value = 200.0 * 0.4;
+  try {
+    deployment::pack(m, quick());
+    FAIL() << "packed";
+  } catch (const PackError& error) {
+    EXPECT_NE(std::string(error.what()).find("up to 128 times the rated one"), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace flexspline::tests::deployment_block_test

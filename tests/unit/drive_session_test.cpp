@@ -2,13 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
+#include "host/drive_link/deployment/pack.hpp"
+#include "host/drive_link/drive/dataset_writer.hpp"
 #include "host/drive_link/drive/recorder.hpp"
 #include "host/drive_link/drive/silence.hpp"
+#include "shared/fixed/turn.hpp"
 #include "tests/support/loopback.hpp"
+#include "tests/support/two_ampere_drive.hpp"
 
 namespace flexspline::drive::drive_session_test {
 namespace {
@@ -60,6 +65,27 @@ TEST(Session, FlashesThroughLostAnswersOfEveryKind) {
     EXPECT_TRUE(std::ranges::equal(drive.store().active(), block)) << static_cast<int>(kind);
     EXPECT_EQ(drive.store().sequence(), 5U) << "once, and not twice";
   }
+}
+
+TEST(Session, ADriveThatHasJustStartedIsAskedAgainUntilItsShaftIsSeenToStand) {
+  for (const Kind kind : {Kind::block_begin, Kind::block_erase_all}) {
+    int times = 3;
+    twin::TwinDrive drive({.drive = demo()});
+    Session session = open_session(drive, [&](protocol::Message& m) {
+      if (m.request() == kind && times-- > 0) m.code = static_cast<std::uint8_t>(protocol::Code::moving);
+      return false;
+    });
+    if (kind == Kind::block_begin) session.write_block(other_block());
+    if (kind == Kind::block_erase_all) session.erase_all_blocks();
+    EXPECT_LE(times, 0) << static_cast<int>(kind);
+  }
+  // One that turns refuses in the end.
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive, [](protocol::Message& m) {
+    if (m.request() == Kind::block_begin) m.code = static_cast<std::uint8_t>(protocol::Code::moving);
+    return false;
+  });
+  EXPECT_NE(error_of([&] { session.write_block(other_block()); }).find("the shaft turns"), std::string::npos);
 }
 
 TEST(Session, ARestoreWhoseAnswerGotLostIsDoneOnce) {
@@ -125,6 +151,72 @@ TEST(Recorder, RecordsARunAndLeavesTheDriveAtRest) {
   }
   EXPECT_NEAR(set, 40.0, 0.1);
   EXPECT_NEAR(most - least, 6.37, 0.4);
+}
+
+TEST(Recorder, PositionsOfALinearAxisAreInMetres) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive);
+  Scales scales = scales_of(session);
+  // As the block of an axis with a pitch of 10 mm; its velocities stay what they are.
+  scales.header.axis = 1;
+  scales.constants.turn_angle_scale = kTurn / 0.01;
+  planning::Run run;
+  run.name = "sine", run.waveform = planning::Waveform::sine;
+  run.amplitude = 40.0, run.frequency_hz = 2.0, run.duration_s = 1.5;
+  planning::Plan plan = plan_of(run);
+  plan.limits.velocity_rad_s = 40.0;
+  const Recording r = Recorder(session, scales, plan).record(run, {});
+  EXPECT_TRUE(r.complete) << r.ended;
+  const auto [least, most] = std::ranges::minmax(r.motor_position_rad);
+  EXPECT_NEAR(most - least, 6.37 / kTurn * 0.01, 0.4 / kTurn * 0.01);
+  for (std::size_t k = 0; k < r.time_s.size(); ++k)
+    EXPECT_NEAR(r.output_position_rad[k], r.motor_position_rad[k] / 100.0, 0.003 / kTurn * 0.01);
+}
+
+TEST(Recorder, SetPointsOfALinearAxisAreInMetres) {
+  twin::TwinDrive drive({.drive = demo()});
+  Session session = open_session(drive);
+  Scales scales = scales_of(session);
+  scales.constants.turn_angle_scale = kTurn / 0.01;
+  planning::Run run;
+  run.mode = planning::Mode::position, run.waveform = planning::Waveform::zero;
+  run.offset = 0.02, run.duration_s = 10.0;
+  PositionMotion motion(run, {}, scales);
+  motion.start_at(0);
+  EXPECT_NEAR(std::ldexp(static_cast<double>(motion.at(5.0, 0.02).position), -32), 2.0, 1e-9) << "turns";
+}
+
+TEST(Recorder, OnlyWhatADriveMeasuresIsInItsFile) {
+  Recording r;
+  r.run.name = "run";
+  r.time_s = {0.0}, r.current_a = {1.0}, r.motor_position_rad = {2.0}, r.output_position_rad = {3.0};
+  r.torque_nm = {4.0}, r.temperature_c = {5.0}, r.command = {6.0};
+  const Scales scales = *scales_of(twin::factory_block(demo()));
+  const std::string all = csv_of(r, scales, {});
+  EXPECT_NE(all.find("output_position_rad,torque_nm,temperature_c"), std::string::npos) << all;
+  EXPECT_NE(all.find("\n0,1,2,3,4,5,6\n"), std::string::npos) << all;
+  EXPECT_NE(all.find("# motor_position_zero: absolute\n# output_position_zero: absolute\n"), std::string::npos) << all;
+  const std::string few =
+      csv_of(r, scales, {}, {.output = false, .torque = false, .knows_turn = false, .knows_output = false});
+  EXPECT_NE(few.find("motor_position_rad,temperature_c"), std::string::npos) << few;
+  EXPECT_NE(few.find("\n0,1,2,5,6\n"), std::string::npos) << few;
+  EXPECT_NE(few.find("# motor_position_zero: none\n"), std::string::npos) << few;
+  EXPECT_EQ(few.find("output_position_zero"), std::string::npos) << few;
+  const std::string unknown = csv_of(r, scales, {}, {.knows_turn = false, .knows_output = false});
+  EXPECT_NE(unknown.find("# output_position_zero: none\n"), std::string::npos) << unknown;
+}
+
+TEST(Recorder, WhatADriveMeasuresIsInItsBlock) {
+  const Measures both = measures_of(twin::factory_block(demo()));
+  EXPECT_TRUE(both.output);
+  EXPECT_TRUE(both.torque);
+  deployment::PackOptions options;
+  options.samples = 300;
+  options.tick_hz = 20'000;
+  options.settings = "format = \"flexspline-drive/1\"\n[motor_encoder]\ncounts = 4096\n";
+  const Measures none = measures_of(deployment::pack(tests::two_ampere_drive(), options).bytes);
+  EXPECT_FALSE(none.output);
+  EXPECT_FALSE(none.torque);
 }
 
 TEST(Recorder, StopsWhenItIsToldToAndBrakesTheShaft) {

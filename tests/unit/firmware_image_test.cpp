@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "host/drive_link/firmware/image_file.hpp"
+#include "host/drive_link/firmware/update.hpp"
 
 namespace flexspline::firmware_files::firmware_image_test {
 namespace {
@@ -84,6 +86,15 @@ TEST(FirmwareImage, WhatCannotBecomeAnImageIsRefused) {
   EXPECT_EQ(version_of("12.255"), (boot::Version{12, 255}));
   for (const char* text : {"", "1", "1.", ".1", "1.256", "-1.0", "1.2.3", "1.x", " 1.2"})
     EXPECT_THROW(version_of(text), ImageError) << text;
+}
+
+TEST(FirmwareUpdate, AnImageThatFailsItsTrialAfterTheFirstAnswerIsSeen) {
+  std::optional<boot::Version> runs = boot::Version{1, 2};
+  const auto look = [&] { return runs; };
+  EXPECT_EQ(text_of(*version_after_trial(look, [&] { runs = boot::Version{1, 1}; })), "1.1");
+  EXPECT_EQ(text_of(*version_after_trial(look, [] {})), "1.1");
+  EXPECT_FALSE(version_after_trial(look, [&] { runs.reset(); }));
+  EXPECT_FALSE(version_after_trial(look, [] { FAIL() << "there is no trial to wait for"; }));
 }
 
 }  // namespace

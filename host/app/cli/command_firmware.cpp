@@ -180,6 +180,10 @@ int flash_firmware(const FlashOptions& options, Console& console) {
   const bool runs = flashes && after == wanted;
   if (!flashes) console.line("Nothing was changed.");
   if (runs) console.line(fmt::format("{} {} runs.", console.good("Firmware"), after));
+  if (runs && before == wanted)
+    console.warn(
+        "the firmware before has the same version: if the image failed its trial and was rolled back, that cannot be "
+        "seen; give each image a version of its own");
   output::save_json(options.json, {{"format", "flexspline-firmware/1"},
                                    {"drive", {{"serial", target.serial}, {"board", target.board}}},
                                    {"before", target.version ? json(before) : json()},

@@ -90,15 +90,31 @@ std::string text_of_file(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-Bytes block_of(const FlashOptions& options, drive::Session& session, const Bytes& active, Console& console) {
-  if (!options.block.empty()) return read_block_file(options.block);
-  const model::ModelFile file = load_model(options.model);
+// The name is a label that pack --drive-name gave: serial numbers and boards can be compared, other names cannot.
+void warn_of_other_drive(const std::string& label, const drive::Session& session, Console& console) {
+  if (label.empty() || label == session.serial() || label == session.board()) return;
+  console.warn(
+      fmt::format("the block was packed for drive \"{}\", and this is {}; flash it only if that is the same one", label,
+                  named(session)));
+}
+
+struct NewBlock {
+  Bytes bytes;
+  std::optional<model::ModelFile> model;  // none: of --block
+};
+NewBlock block_of(const FlashOptions& options, drive::Session& session, const Bytes& active, Console& console) {
+  if (!options.block.empty()) {
+    const Bytes block = read_block_file(options.block);
+    warn_of_other_drive(drive::view_of(block).drive, session, console);
+    return {drive::keeping_motor(drive::keeping_stored_zero(block, active), active), {}};
+  }
+  model::ModelFile file = load_model(options.model);
   std::optional<drive::SettingsFile> settings;
   if (!options.settings.empty()) settings = {text_of_file(options.settings), options.settings.string()};
   console.progress("proving the block and comparing it with double");
-  const drive::ModelBlock made = drive::model_block(session, active, file.model, settings, options.measured);
+  drive::ModelBlock made = drive::model_block(session, active, file.model, settings, options.measured);
   for (const std::string& warning : made.warnings) console.warn(warning);
-  return made.bytes;
+  return {std::move(made.bytes), std::move(file)};
 }
 
 int run(const BackupOptions& options, Console& console) {
@@ -172,17 +188,24 @@ int run(const RestoreOptions& options, Console& console) {
 void declare(Parser& parser, FlashOptions& options) {
   take_drive(parser, options.drive);
   parser.option("--model", options.model, "model file, packed for this drive").value("MODEL");
-  parser.option("--block", options.block, "parameter block of pack or backup").value("BLOCK");
+  Option block = parser.option("--block", options.block, "parameter block of pack or backup");
+  block.value("BLOCK");
   parser
       .option("--settings", options.settings,
-              "of the drive, as pack --drive takes them (default: those of its active block)")
-      .value("FILE.toml");
-  parser.option("--firmware", options.firmware, "firmware image of flexspline image, over USB").value("IMAGE");
+              "with --model: of the drive, as pack --drive takes them (default: those of its active block)")
+      .value("FILE.toml")
+      .excludes(block);
+  Option firmware = parser.option("--firmware", options.firmware, "firmware image of flexspline image, over USB");
+  firmware.value("IMAGE");
   parser.flag("--older", options.older, "with --firmware: an image older than what the drive has");
-  parser.option("--draws", options.draws, "random parameter sets drawn for the predicted error; 0: no prediction")
+  parser
+      .option("--draws", options.draws,
+              "with --model: random parameter sets drawn for the predicted error; 0: no prediction")
       .one_of_numbers({0, 3, 4, 5, 6, 8, 12, 20})
-      .shows_default();
-  parser.flag("--measured", options.measured, "as in pack --measured");
+      .shows_default()
+      .excludes(block)
+      .excludes(firmware);
+  parser.flag("--measured", options.measured, "with --model: as in pack --measured").excludes(block).excludes(firmware);
   take_pairing_key(parser, options.pairing_key);
   take_yes(parser, options.yes);
 }
@@ -213,8 +236,8 @@ int flash(const FlashOptions& options, Console& console) {
   drive::Session session = open_drive(options.drive);
   drive::require_access(session, signer);
   const Bytes active = session.read_block(protocol::Which::active);
-  const Bytes block =
-      drive::keeping_motor(drive::keeping_stored_zero(block_of(options, session, active, console), active), active);
+  const NewBlock made = block_of(options, session, active, console);
+  const Bytes& block = made.bytes;
   const std::vector<BlockChange> changes = drive::changes(active, block);
   const BlockView before = drive::view_of(active), after = drive::view_of(block);
   console.line(fmt::format("{}", named(session)));
@@ -224,8 +247,7 @@ int flash(const FlashOptions& options, Console& console) {
   const bool is_new = block != active;
   if (!is_new) console.line("The drive has this block already; nothing to do.");
   json predicted;
-  if (is_new && !options.model.empty())
-    predicted = predict_flash(load_model(options.model).model, block, active, options.draws, console);
+  if (is_new && made.model) predicted = predict_flash(made.model->model, block, active, options.draws, console);
   const bool flashes = is_new && confirmed("Flash it?", options.yes);
   if (is_new && !flashes) console.line("Nothing was changed.");
   if (flashes) {

@@ -261,33 +261,42 @@ int run(const UnpackOptions& options, Console& console) {
 void declare(Parser& parser, PackCommandOptions& options) {
   take_model(parser, options.model);
   parser.option("--out", options.out, "the parameter block").required().value("BLOCK");
-  parser.option("--tick-hz", options.pack.tick_hz, "ticks of the drive's control loop a second")
-      .shows_default()
-      .value("HZ");
+  Option tick = parser.option("--tick-hz", options.pack.tick_hz, "ticks of the drive's control loop a second");
+  tick.shows_default().value("HZ");
   parser.option("--bound", options.pack.bound, "largest error against double, as a share of rated torque")
       .positive()
       .shows_default()
       .value("SHARE");
   parser.flag("--measured", options.pack.measured,
               "where the error cannot be proven, take the largest one along samples of the envelope");
-  parser.option("--drive", options.drive, "settings of the drive: its loops, limits and sensors").value("FILE.toml");
+  Option settings = parser.option("--drive", options.drive, "settings of the drive: its loops, limits and sensors")
+                        .value("FILE.toml");
+  Option image =
+      parser.option("--image", options.pack.image, "effects that the firmware has (default: all that can run)");
+  image.value("EFFECT").comma_separated().one_value_each_time();
   parser
       .option("--for-drive", options.for_drive,
               "a drive in reach: its tick rate, the effects of its image, and full scales, largest current and "
               "sensors of its board, which the settings then need not state")
-      .value("DRIVE");
-  parser.option("--drive-name", options.pack.drive, "name of the drive that the block is for (default: any)")
+      .value("DRIVE")
+      .excludes(tick)
+      .excludes(image);
+  parser
+      .option("--drive-name", options.pack.drive,
+              "serial number, board or another name of the drive that the block is for; flash --block warns on "
+              "another drive (default: any)")
       .value("NAME");
-  parser.option("--encoder-counts", options.pack.encoder_counts, "per motor turn: the block then has an encoder filter")
-      .value("COUNTS");
-  parser.option("--filter-corner-hz", options.pack.filter_corner_hz, "corner of the encoder filter")
+  Option counts = parser.option("--encoder-counts", options.pack.encoder_counts,
+                                "per motor turn: the block then has an encoder filter");
+  counts.value("COUNTS");
+  parser
+      .option("--filter-corner-hz", options.pack.filter_corner_hz,
+              "corner of the encoder filter; with --drive its corner_hz is taken")
       .positive()
       .shows_default()
-      .value("HZ");
-  parser.option("--image", options.pack.image, "effects that the firmware has (default: all that can run)")
-      .value("EFFECT")
-      .comma_separated()
-      .one_value_each_time();
+      .value("HZ")
+      .needs(counts)
+      .excludes(settings);
 }
 
 void declare(Parser& parser, UnpackOptions& options) {

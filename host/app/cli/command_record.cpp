@@ -15,6 +15,7 @@
 #include "host/drive_link/drive/dataset_writer.hpp"
 #include "host/drive_link/drive/recorder.hpp"
 #include "host/engine/planning/report_plans.hpp"
+#include "host/input/data/dataset_toml.hpp"
 #include "host/output/answers/json.hpp"
 
 namespace flexspline::cli {
@@ -75,6 +76,7 @@ json json_of(const drive::Recording& r) {
           {"duration_s", r.time_s.empty() ? 0.0 : r.time_s.back()},
           {"frames_lost", r.lost},
           {"frames_dropped_by_drive", r.dropped},
+          {"gap_count", r.gap_count},
           {"gaps", gaps},
           {"complete", r.complete},
           {"ended", r.ended.empty() ? json() : json(r.ended)}};
@@ -86,9 +88,10 @@ void print(const drive::Recording& r, Console& console) {
                            r.complete ? std::string() : ", incomplete: " + r.ended));
   if (r.lost > 0)
     console.warn(
-        fmt::format("{}: {} frames were lost in {} gaps, {} of them on the drive; the file names them. Record "
+        fmt::format("{}: {} frames were lost in {} gaps, {} of them on the drive; the file names {}. Record "
                     "more slowly (sample_s), or on a faster line or machine",
-                    r.run.name, r.lost, r.gaps.size(), r.dropped));
+                    r.run.name, r.lost, r.gap_count, r.dropped,
+                    r.gap_count > r.gaps.size() ? fmt::format("the first {} gaps", r.gaps.size()) : "them"));
 }
 
 // Only the runs that were named, in the plan's order.
@@ -126,6 +129,32 @@ planning::Plan report_plan_of(const RecordOptions& options, planning::FullScale 
       fmt::format("there is no file {} and no such plan of the report; there are {}", options.plan.string(), known));
 }
 
+// The measurements that commands read from this folder now.
+std::vector<std::string> recordings_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  if (!fs::is_directory(folder)) return names;
+  if (const fs::path listed = folder / "dataset.toml"; fs::exists(listed)) {
+    data::Findings findings;
+    for (const data::ExperimentEntry& e : data::read_dataset_toml(listed, findings).experiments)
+      names.push_back(e.file.lexically_normal().lexically_relative(folder.lexically_normal()).string());
+    if (!names.empty()) return names;
+  }
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (const auto kind = entry.path().extension(); kind == ".csv" || kind == ".mat")
+      names.push_back(entry.path().filename().string());
+  std::ranges::sort(names);
+  return names;
+}
+// A new dataset.toml lists only the runs of this call: others would not be read any more.
+void require_no_other_recordings(const fs::path& folder, const planning::Plan& plan) {
+  for (const std::string& name : recordings_in(folder))
+    if (std::ranges::none_of(plan.runs, [&](const planning::Run& run) { return run.name + ".csv" == name; }))
+      throw UsageError(
+          fmt::format("{}: has the measurement {}, which is not of this plan's runs and would not be read any more; "
+                      "give another folder",
+                      folder.string(), name));
+}
+
 planning::Plan plan_of(const RecordOptions& options, bool is_report) {
   planning::Plan plan = is_report ? report_plan_of(options, {100.0, 1.0}) : planning::read(options.plan);
   if (!is_report && (options.full_velocity_rad_s || options.full_current_a))
@@ -135,6 +164,7 @@ planning::Plan plan_of(const RecordOptions& options, bool is_report) {
   if (plan.runs.empty()) throw UsageError(options.plan.string() + ": the plan has no [[run]]: nothing to record");
   if (!options.force && fs::exists(options.out) && !fs::is_empty(options.out))
     throw UsageError(options.out.string() + ": is there and not empty; give another folder, or --force");
+  require_no_other_recordings(options.out, plan);
   require_person(plan, options.yes);
   return plan;
 }
@@ -147,7 +177,8 @@ struct RecordedRuns {
 
 // One run after the other; each complete one is saved at once.
 RecordedRuns record_runs(drive::Recorder& recorder, const planning::Plan& plan, const drive::Scales& scales,
-                         const drive::Origin& origin, const RecordOptions& options, Console& console) {
+                         const drive::Origin& origin, drive::Measures measures, const RecordOptions& options,
+                         Console& console) {
   RecordedRuns recorded;
   for (std::size_t i = 0; i < plan.runs.size() && recorded.ended.empty(); ++i) {
     const planning::Run& run = plan.runs[i];
@@ -156,6 +187,9 @@ RecordedRuns record_runs(drive::Recorder& recorder, const planning::Plan& plan, 
       break;
     }
     try {
+      // Until an index pulse comes, or somebody homes it, a drive with an encoder that only counts knows neither.
+      const protocol::Reference known = recorder.reference();
+      measures.knows_turn = known.knows_turn, measures.knows_output = known.knows_output;
       drive::Recording r =
           recorder.record(run, {Interruptible::interrupted, [&](double time_s) {
                                   console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,
@@ -163,7 +197,7 @@ RecordedRuns record_runs(drive::Recorder& recorder, const planning::Plan& plan, 
                                 }});
       print(r, console);
       recorded.ended = r.ended;
-      if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin));
+      if (r.complete) model::save(options.out / (run.name + ".csv"), drive::csv_of(r, scales, origin, measures));
       recorded.all.push_back(std::move(r));
     } catch (const std::exception& error) {
       // What was finished is worth keeping.
@@ -205,7 +239,8 @@ int run(const RecordOptions& options, Console& console) {
   if (options.clear_fault) recorder.clear_fault();
   console.line(named(session));
   const Interruptible interruptible;
-  const RecordedRuns recorded = record_runs(recorder, plan, scales, origin, options, console);
+  const RecordedRuns recorded =
+      record_runs(recorder, plan, scales, origin, drive::measures_of(block), options, console);
   const auto complete =
       std::count_if(recorded.all.begin(), recorded.all.end(), [](const auto& r) { return r.complete; });
   if (complete > 0) model::save(options.out / "dataset.toml", drive::dataset_toml_of(recorded.all, scales, origin));

@@ -25,8 +25,7 @@ void pack_all(ComparisonSetup& setup) {
     one.block = deployment::pack(one.model, pack).bytes;
     if (&one != setup.models.data()) continue;
     const double most_a = 1.99 * deployment::bases_of(one.model, 1.0 / setup.job.tick_hz).current_base;
-    std::optional<double> lowered_from_a;
-    settings = drive::settings_text(deployment::unpack(one.block), most_a, lowered_from_a);
+    settings = drive::kept_settings(deployment::unpack(one.block), most_a).text;
   }
 }
 

@@ -452,49 +452,4 @@ control::DriveSettings<fixed::Fixed> settings_of(const control::DriveSetup<doubl
   return settings;
 }
 
-std::vector<NamedQuantity> described(const control::DriveSettings<fixed::Fixed>& s, const DriveConstants<double>& d) {
-  const auto in = [](fixed::Value x, double base) { return std::ldexp(x.raw, -fixed::kValueBits) * base; };
-  const auto gain = [](const auto& g) { return std::ldexp(g.mantissa, g.exponent - fixed::kMantissaBits); };
-  const auto seconds = [&](std::uint32_t ticks) { return ticks * d.time_base; };
-  const double speed = std::ldexp(d.angle_base / d.time_base, -48);
-  std::vector<NamedQuantity> all = {
-      {"tick_rate", static_cast<double>(s.tick_hz), "Hz"},
-      {"motor_encoder_counts", static_cast<double>(s.motor_encoder.counts), ""},
-      {"output_encoder_counts", s.has_output_encoder ? static_cast<double>(s.output_encoder.counts) : 0.0, ""},
-      {"position_gain", gain(s.loops.position) * d.velocity_base / d.angle_base, "1/s"},
-      {"velocity_gain", gain(s.loops.velocity) * d.torque_base / d.velocity_base, "N*m*s/rad"},
-      {"integral_gain",
-       std::ldexp(static_cast<double>(s.loops.integral.raw), -fixed::kShareBits) * d.torque_base /
-           (d.velocity_base * d.time_base),
-       "N*m/rad"},
-      {"torque_limit", in(s.loops.torque_limit, d.torque_base), "N*m"},
-      {"current_limit", in(s.loops.current_limit, d.current_base), "A"},
-      {"velocity_limit", in(s.loops.velocity_limit, d.velocity_base), "rad/s"},
-      {"no_torque_drives_above", in(s.loops.guard.overspeed, d.velocity_base), "rad/s"},
-      {"acceleration_limit", static_cast<double>(s.trajectory.change) * speed / d.time_base, "rad/s^2"},
-      {"current_sensor_full_scale", gain(s.current.gain) * d.current_base, "A"},
-      {"torque_sensor_full_scale", s.has_torque_sensor ? gain(s.torque.gain) * d.output_torque_base : 0.0, "N*m"},
-      {"temperature_sensor_full_scale", gain(s.temperature.gain) * d.temperature_base, "degC"},
-      {"amplifier_full_scale", d.current_base / gain(s.amplifier), "A"},
-      {"direction_band", d.velocity_base / gain(s.feedforward.per_band), "rad/s"},
-      {"fault_overspeed", in(s.safety.overspeed, d.velocity_base), "rad/s"},
-      {"fault_overcurrent", in(s.safety.overcurrent, d.current_base), "A"},
-      {"fault_overtemperature", in(s.safety.overtemperature, d.temperature_base), "degC"},
-      {"fault_acceleration", in(s.safety.acceleration, d.acceleration_base), "rad/s^2"},
-      {"fault_host", seconds(s.safety.host_ticks), "s"},
-      {"fault_stop", seconds(s.safety.stop_ticks), "s"},
-      {"fault_following_error", std::ldexp(static_cast<double>(s.following.position), -32) * d.angle_base, "rad"},
-      {"fault_following_velocity", in(s.following.velocity, d.velocity_base), "rad/s"},
-      {"fault_following", seconds(s.following.ticks), "s"},
-      {"fault_output_stuck", s.following.motor_counts * d.angle_base / (d.gear_ratio * s.motor_encoder.counts), "rad"},
-      {"residual_map_largest",
-       s.residual_map.scale == 0
-           ? 0.0
-           : control::ResidualMap::kLargest * d.torque_base * 0x1p27 / static_cast<double>(s.residual_map.scale),
-       "N*m"},
-      {"excitation", seconds(s.excitation.ticks), "s"},
-  };
-  return all;
-}
-
 }  // namespace flexspline::deployment

@@ -3,6 +3,8 @@
 #include <array>
 #include <bit>
 #include <limits>
+#include <set>
+#include <string>
 
 #include "host/drive_link/deployment/pack.hpp"
 #include "host/physics/catalogue/catalogue.hpp"
@@ -25,6 +27,22 @@ double take(model::Reader& r) {
   return std::bit_cast<double>(r.take<std::uint64_t>());
 }
 
+// At most `most` bytes of it; no character is cut in two.
+std::string beginning_of(const std::string& text, std::size_t most) {
+  if (text.size() <= most) return text;
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0U) == 0x80U) --most;
+  return text.substr(0, most);
+}
+// An id as the note holds it: long ones that begin alike get a number.
+std::string stored_id(const std::string& id, std::set<std::string>& taken) {
+  std::string stored = beginning_of(id, kMostText);
+  for (int number = 2; !taken.insert(stored).second; ++number) {
+    const std::string ending = "~" + std::to_string(number);
+    stored = beginning_of(id, kMostText - ending.size()) + ending;
+  }
+  return stored;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> note_of(const model::Drive& drive, const std::vector<EffectValues>& effects) {
@@ -34,8 +52,9 @@ std::vector<std::uint8_t> note_of(const model::Drive& drive, const std::vector<E
   w.put(static_cast<std::uint32_t>(drive.axis == data::Axis::linear ? 1 : 0));
   for (const model::Quantity* q : quantities(copy)) put(w, q->value.value_or(std::numeric_limits<double>::quiet_NaN()));
   w.put(static_cast<std::uint32_t>(effects.size()));
+  std::set<std::string> taken;
   for (const EffectValues& e : effects) {
-    const std::string id = e.id.substr(0, kMostText);
+    const std::string id = stored_id(e.id, taken);
     w.put(static_cast<std::uint16_t>(e.number));
     w.put(static_cast<std::uint16_t>(id.size()));
     for (const char c : id) w.put(static_cast<std::uint8_t>(c));

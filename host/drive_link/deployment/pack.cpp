@@ -30,6 +30,7 @@ using fixed::Fixed;
 using fixed::OverflowLog;
 
 constexpr std::array<double, 4> kTorqueScales = {1.0, 2.0, 4.0, 8.0};
+constexpr double kLargestValue = 16.0;  // bases that a value can hold
 // Limits in bases: those of torque and current are the ratings, so that they hold where nothing else is known.
 constexpr double kOverspeed = 1.25;
 constexpr double kDirectionBand = 1.0 / 200.0;
@@ -125,7 +126,7 @@ ScaledModel proven(const std::vector<EffectValues>& effects, const DriveConstant
   }
   throw PackError(reason + fmt::format(" (with torques up to {:g} times the rated one); check its parameters against "
                                        "the ratings in [drive]",
-                                       kTorqueScales.back()));
+                                       kLargestValue * kTorqueScales.back()));
 }
 
 std::array<double, 3> torque_bases(const DriveConstants<double>& d) {

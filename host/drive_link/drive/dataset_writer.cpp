@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "host/common/text/build_identity.hpp"
+#include "host/drive_link/drive/block_sections.hpp"
 #include "host/physics/model/text.hpp"
 
 namespace flexspline::drive {
@@ -19,7 +20,20 @@ std::string real(double value) {
 
 }  // namespace
 
-std::string csv_of(const Recording& r, const Scales& scales, const Origin& origin) {
+Measures measures_of(const Bytes& block) {
+  Measures measures;
+  measures.output = encoder_counts_in(block, model::Section::output_encoder) > 0;
+  model::for_each_entry(block, [&](std::uint16_t kind, std::span<const std::uint8_t> bytes) {
+    if (kind != static_cast<std::uint16_t>(model::Section::general)) return;
+    model::FieldReader reader(bytes);
+    control::GeneralSettings general;
+    general.fields(reader);
+    measures.torque = general.has_torque_sensor;
+  });
+  return measures;
+}
+
+std::string csv_of(const Recording& r, const Scales& scales, const Origin& origin, const Measures& measures) {
   fmt::memory_buffer text;
   const auto line = [&]<class... Args>(fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(text), format, std::forward<Args>(args)...);
@@ -31,8 +45,8 @@ std::string csv_of(const Recording& r, const Scales& scales, const Origin& origi
   line("# gear_ratio: {:.8g}", scales.constants.gear_ratio);
   line("# torque_constant_nm_a: {:.8g}", scales.constants.torque_constant);
   if (scales.header.encoder_counts > 0) line("# encoder_counts: {}", scales.header.encoder_counts);
-  line("# motor_position_zero: absolute");
-  line("# output_position_zero: absolute");
+  line("# motor_position_zero: {}", measures.knows_turn ? "absolute" : "none");
+  if (measures.output) line("# output_position_zero: {}", measures.knows_output ? "absolute" : "none");
   line("# current_hold: none");
   line("# drive_serial: {}", origin.serial);
   line("# drive_board: {}", origin.board);
@@ -46,13 +60,15 @@ std::string csv_of(const Recording& r, const Scales& scales, const Origin& origi
                         : r.run.mode == planning::Mode::position ? "position_command_rad"
                                                                  : "current_command_a";
   const bool has_load = r.run.load_torque_nm != 0.0;
-  line("time_s,current_a,motor_position_rad,output_position_rad,torque_nm,temperature_c,{}{}", command,
-       has_load ? ",load_torque_nm" : "");
+  line("time_s,current_a,motor_position_rad,{}{}temperature_c,{}{}", measures.output ? "output_position_rad," : "",
+       measures.torque ? "torque_nm," : "", command, has_load ? ",load_torque_nm" : "");
+  const auto end = std::back_inserter(text);
   for (std::size_t k = 0; k < r.time_s.size(); ++k) {
-    fmt::format_to(std::back_inserter(text), "{:.9g},{:.7g},{:.10g},{:.10g},{:.7g},{:.6g},{:.7g}", r.time_s[k],
-                   r.current_a[k], r.motor_position_rad[k], r.output_position_rad[k], r.torque_nm[k],
-                   r.temperature_c[k], r.command[k]);
-    if (has_load) fmt::format_to(std::back_inserter(text), ",{:.7g}", r.run.load_torque_nm);
+    fmt::format_to(end, "{:.9g},{:.7g},{:.10g}", r.time_s[k], r.current_a[k], r.motor_position_rad[k]);
+    if (measures.output) fmt::format_to(end, ",{:.10g}", r.output_position_rad[k]);
+    if (measures.torque) fmt::format_to(end, ",{:.7g}", r.torque_nm[k]);
+    fmt::format_to(end, ",{:.6g},{:.7g}", r.temperature_c[k], r.command[k]);
+    if (has_load) fmt::format_to(end, ",{:.7g}", r.run.load_torque_nm);
     text.push_back('\n');
   }
   return fmt::to_string(text);

@@ -53,26 +53,32 @@ ModelBlock model_block(Session& session, const Bytes& active, const model::Model
   ModelBlock made;
   deployment::PackOptions pack = pack_options_for(session);
   pack.measured = measured;
+  std::optional<deployment::Unpacked> before;  // whose settings are kept
   if (settings) {
     pack.settings = settings->text;
     pack.settings_origin = settings->origin;
   } else if (!active.empty()) {
     // Signals are limited to two bases where they enter a drive.
     const double most_a = 1.99 * deployment::bases_of(model, 1.0 / pack.tick_hz).current_base;
-    std::optional<double> lowered_from_a;
-    pack.settings = settings_text(deployment::unpack(active), most_a, lowered_from_a);
+    before = deployment::unpack(active);
+    KeptSettings kept = kept_settings(*before, most_a);
+    pack.settings = std::move(kept.text);
+    made.warnings = std::move(kept.warnings);
     // Rounding of the block's integers is not reported.
-    if (lowered_from_a && *lowered_from_a > 1.001 * most_a)
+    if (const auto from_a = kept.overcurrent_lowered_from_a; from_a && *from_a > 1.001 * most_a)
       made.warnings.push_back(
           fmt::format("overcurrent is lowered from {:.4g} A to {:.4g} A: with this model's rated current the "
                       "drive measures no more; a higher rated_current_a in [drive] keeps it",
-                      *lowered_from_a, most_a));
+                      *from_a, most_a));
     pack.settings_origin = "the active block's settings";
   } else {
     throw deployment::PackError("the drive has no block to take its settings from; state them: --settings FILE.toml");
   }
   const Bytes packed = deployment::pack(model, pack).bytes;
   require_same_gear(active, packed);
+  if (before)
+    for (std::string& change : changed_settings(*before, deployment::unpack(packed)))
+      made.warnings.push_back(std::move(change));
   made.bytes = keeping_motor(keeping_stored_zero(packed, active), active);
   return made;
 }

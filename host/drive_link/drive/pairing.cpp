@@ -20,18 +20,6 @@ using protocol::PairingState;
 
 constexpr Milliseconds kLongestWait{3000};
 
-// A request that is refused while the shaft moves: a drive that was just switched on finds that out first.
-protocol::Message ask_at_rest(Session& session, const protocol::Message& request) {
-  constexpr int kAttempts = 20;
-  for (int attempt = 1;; ++attempt) {
-    const protocol::Message answer = session.exchange(request);
-    const auto code = static_cast<Code>(answer.code);
-    if (code == Code::done) return answer;
-    if (code != Code::moving || attempt == kAttempts) session.fail(std::string(protocol::text_of(code)));
-    std::this_thread::sleep_for(Milliseconds(10));
-  }
-}
-
 void answer_challenge(Session& session, const PairingSigner& signer, PairingAction action) {
   if (const Milliseconds wait(pairing_of(session).wait_ms); wait > kLongestWait) {
     session.fail(fmt::format("it waits after wrong signatures; try again in {} s", (wait.count() + 999) / 1000));
@@ -39,7 +27,7 @@ void answer_challenge(Session& session, const PairingSigner& signer, PairingActi
     std::this_thread::sleep_for(wait);
   }
   protocol::PairingChallenge challenge;
-  const auto answer = ask_at_rest(session, protocol::request(Kind::pairing_challenge, 0, protocol::Empty{}));
+  const auto answer = session.ask_at_rest(protocol::request(Kind::pairing_challenge, 0, protocol::Empty{}));
   if (protocol::take_payload(answer.content(), challenge) != Code::done)
     session.fail("its answer cannot be understood");
   const protocol::DriveName drive{session.identity().board, session.identity().serial};
@@ -52,7 +40,7 @@ void answer_challenge(Session& session, const PairingSigner& signer, PairingActi
     std::copy_n(signature.begin() + 32 * half, 32, part.bytes.begin());
     session.ask(Kind::pairing_part, part);
   }
-  ask_at_rest(session, protocol::request(Kind::pairing_answer, 0, protocol::PairingAnswer{action}));
+  session.ask_at_rest(protocol::request(Kind::pairing_answer, 0, protocol::PairingAnswer{action}));
 }
 
 }  // namespace
@@ -92,7 +80,7 @@ void pair(Session& session, const PairingSigner& signer) {
 }
 
 void remove_pairing(Session& session) {
-  ask_at_rest(session, protocol::request(Kind::pairing_remove, 0, protocol::Empty{}));
+  session.ask_at_rest(protocol::request(Kind::pairing_remove, 0, protocol::Empty{}));
 }
 
 void lock(Session& session) noexcept {

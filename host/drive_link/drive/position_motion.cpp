@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "shared/fixed/turn.hpp"
-
 namespace flexspline::drive {
 namespace {
 
@@ -53,7 +51,7 @@ protocol::Command PositionMotion::at(double time_s, double set_point_rad) const 
   protocol::Command c;
   c.kind = protocol::CommandKind::set;
   c.mode = protocol::Mode::position;
-  c.position = start_ + static_cast<std::int64_t>(std::llround(target / kTurn * 0x1p32));
+  c.position = start_ + static_cast<std::int64_t>(std::llround(target / scales_.turn() * 0x1p32));
   // Zero would mean as fast as the drive may.
   c.velocity = std::max(scales_.per_unit(std::abs(velocity), scales_.constants.velocity_base), 1);
   return c;

@@ -12,7 +12,6 @@
 #include "host/engine/planning/excitation.hpp"
 #include "shared/control/excitation.hpp"
 #include "shared/fixed/overflow_log.hpp"
-#include "shared/fixed/turn.hpp"
 #include "shared/protocol/excitation_requests.hpp"
 #include "shared/protocol/texts.hpp"
 
@@ -99,8 +98,8 @@ class Recorder::Columns {
     const auto value = [&](std::size_t i) { return scales_.value(channels_[i], words[i]); };
     const double samples = 1.0 + missing;
     out_.time_s.push_back(time_s);
-    out_.motor_position_rad.push_back(kTurn * motor_.next(value(0), samples));
-    out_.output_position_rad.push_back(kTurn * output_.next(value(1), samples));
+    out_.motor_position_rad.push_back(scales_.turn() * motor_.next(value(0), samples));
+    out_.output_position_rad.push_back(scales_.turn() * output_.next(value(1), samples));
     out_.current_a.push_back(value(2));
     out_.torque_nm.push_back(value(3));
     out_.temperature_c.push_back(value(4));
@@ -115,7 +114,7 @@ class Recorder::Columns {
     output_.begin(output);
   }
   bool is_set() const { return set_.known(); }
-  double set_point_rad() const { return set_.known() ? kTurn * (set_.now() - set_begin_) : 0.0; }
+  double set_point_rad() const { return set_.known() ? scales_.turn() * (set_.now() - set_begin_) : 0.0; }
   std::uint32_t last_tick() const { return last_tick_; }
   const std::string& exceeded() const { return exceeded_; }
 
@@ -130,17 +129,19 @@ class Recorder::Columns {
       const double off = begin - motor_.now();
       set_begin_ = motor_.now() + off - std::nearbyint(off);
       set_.begin(set_begin_);
-      return kTurn * set_begin_;
+      return scales_.turn() * set_begin_;
     }
-    return kTurn * set_.next(scales_.value(Channel::set_fraction, word), samples);
+    return scales_.turn() * set_.next(scales_.value(Channel::set_fraction, word), samples);
   }
   void note_gap(std::uint32_t frames, double from_s) {
     if (frames == 0) return;
     out_.lost += frames;
+    ++out_.gap_count;
     if (out_.gaps.size() < kLongestGapList) out_.gaps.push_back({from_s, frames});
   }
   void watch() {
     const planning::Limits& limits = plan_.limits;
+    const bool is_linear = scales_.is_linear();
     const std::size_t n = out_.time_s.size();
     constexpr std::size_t kOver10 = 10;
     if (n <= kOver10 || !exceeded_.empty()) return;
@@ -151,13 +152,13 @@ class Recorder::Columns {
     const auto& q = out_.motor_position_rad;
     too_much("a velocity",
              std::abs(q[n - 1] - q[n - 1 - kOver10]) / (out_.time_s[n - 1] - out_.time_s[n - 1 - kOver10]),
-             limits.velocity_rad_s, "rad/s");
+             limits.velocity_rad_s, is_linear ? "m/s" : "rad/s");
     double current = 0.0;
     for (std::size_t i = n - kOver10; i < n; ++i) current += out_.current_a[i] / kOver10;
     too_much("a current", std::abs(current), limits.current_a, "A");
     low_ = std::min(low_, out_.output_position_rad.back());
     high_ = std::max(high_, out_.output_position_rad.back());
-    too_much("a travel of the output", high_ - low_, limits.travel_rad, "rad");
+    too_much("a travel of the output", high_ - low_, limits.travel_rad, is_linear ? "m" : "rad");
   }
 
   const Scales& scales_;
@@ -228,6 +229,10 @@ void Recorder::send_excitation(const planning::Run& run) {
 
 void Recorder::clear_fault() {
   if (session_.status().mode == protocol::Mode::fault) session_.command({.kind = protocol::CommandKind::clear_fault});
+}
+
+protocol::Reference Recorder::reference() {
+  return session_.identity().minor < protocol::kMinorOfHardware ? protocol::Reference{} : session_.reference();
 }
 
 // Positions of motor and output, whole turns included; the drive sends them in telemetry alone.

@@ -24,7 +24,8 @@ struct Recording {
   std::vector<double> time_s, current_a, motor_position_rad, output_position_rad, torque_nm, temperature_c, command;
   std::uint32_t lost = 0;     // frames, wherever
   std::uint32_t dropped = 0;  // of these on the drive, which had no room for them
-  std::vector<Gap> gaps;
+  std::uint32_t gap_count = 0;
+  std::vector<Gap> gaps;  // the first of them
   bool complete = false;
   std::string ended;  // why it is not: "interrupted", a limit, a fault
 };
@@ -42,6 +43,8 @@ class Recorder {
   };
   // Clears a fault of the drive whose cause, as the user states, is gone.
   void clear_fault();
+  // What the drive knows of its positions; nothing where its firmware is older than that.
+  protocol::Reference reference();
   // The drive is at rest and not armed when it returns, and where the link still works also when it throws.
   Recording record(const planning::Run& run, const Watch& watch);
 

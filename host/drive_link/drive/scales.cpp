@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host/drive_link/deployment/bases.hpp"
+#include "shared/fixed/turn.hpp"
 #include "shared/protocol/texts.hpp"
 
 namespace flexspline::drive {
@@ -41,6 +42,10 @@ double Scales::value(protocol::Channel channel, std::uint32_t word) const {
 
 std::int32_t Scales::per_unit(double value, double base) const {
   return static_cast<std::int32_t>(std::lround(std::ldexp(std::clamp(value / base, -1.99, 1.99), fixed::kValueBits)));
+}
+
+double Scales::turn() const {
+  return kTurn / constants.turn_angle_scale;
 }
 
 std::optional<Scales> scales_of(const Bytes& block) {

@@ -18,6 +18,9 @@ struct Scales {
   // A channel's word in its unit (protocol::kChannelTexts). Whole turns and fractions of them are both in turns.
   double value(protocol::Channel channel, std::uint32_t word) const;
   std::int32_t per_unit(double value, double base) const;  // limited to two bases
+  // Positions of both shafts for a turn: rad, m on a linear axis.
+  double turn() const;
+  bool is_linear() const { return header.axis == 1; }
 };
 
 // None where the bytes are no good block's beginning.

@@ -69,27 +69,23 @@ protocol::Reference Session::reference() {
 void Session::home(std::int64_t position) {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than position references; bring the firmware up to date");
-  ask_at_rest(protocol::request(Kind::home, 0, protocol::Home{position}));
+  take_refusal(exchange_at_rest(protocol::request(Kind::home, 0, protocol::Home{position})));
 }
 
 void Session::start_commissioning(const protocol::CommissioningBegin& request) {
-  ask_at_rest(protocol::request(Kind::commissioning_begin, 0, request));
+  take_refusal(exchange_at_rest(protocol::request(Kind::commissioning_begin, 0, request)));
 }
 
-void Session::ask_at_rest(const protocol::Message& request) {
-  // A drive that was just switched on checks its sensors first, and then whether its shaft stands.
+protocol::Message Session::exchange_at_rest(const protocol::Message& request) {
   constexpr int kMostAttempts = 100, kMostWhileMoving = 20;
   for (int attempt = 1;; ++attempt) {
     const protocol::Message answer = exchange(request);
+    const auto code = static_cast<Code>(answer.code);
     protocol::CommandAnswer refused;
-    const bool is_refused = static_cast<Code>(answer.code) == Code::refused &&
-                            protocol::take_payload(answer.content(), refused) == Code::done;
-    const bool starts = is_refused && (refused.refusal == protocol::Refusal::booting ||
-                                       (refused.refusal == protocol::Refusal::moving && attempt < kMostWhileMoving));
-    if (!starts || attempt == kMostAttempts) {
-      take_refusal(answer);
-      return;
-    }
+    const bool is_refused = code == Code::refused && protocol::take_payload(answer.content(), refused) == Code::done;
+    const bool boots = is_refused && refused.refusal == protocol::Refusal::booting;
+    const bool moves = code == Code::moving || (is_refused && refused.refusal == protocol::Refusal::moving);
+    if (attempt == kMostAttempts || !(boots || (moves && attempt < kMostWhileMoving))) return answer;
     std::this_thread::sleep_for(Milliseconds(10));
   }
 }
@@ -97,7 +93,7 @@ void Session::ask_at_rest(const protocol::Message& request) {
 void Session::erase_all_blocks() {
   if (identity_.minor < protocol::kMinorOfHardware)
     fail("its firmware is older than the factory reset; bring the firmware up to date");
-  done(exchange(protocol::request(Kind::block_erase_all, 0, protocol::Empty{})));
+  ask_at_rest(protocol::request(Kind::block_erase_all, 0, protocol::Empty{}));
 }
 
 std::string Session::board() const {
@@ -221,7 +217,8 @@ Bytes Session::read_block(protocol::Which which) {
 
 void Session::write_block(const Bytes& block, const std::function<void(std::size_t)>& progress) {
   const std::uint32_t crc = model::crc32(block);
-  ask(Kind::block_begin, protocol::BlockBegin{static_cast<std::uint32_t>(block.size()), crc});
+  const protocol::BlockBegin begin{static_cast<std::uint32_t>(block.size()), crc};
+  ask_at_rest(protocol::request(Kind::block_begin, 0, begin));
   for (std::size_t at = 0; at < block.size();) {
     protocol::Chunk chunk;
     chunk.offset = static_cast<std::uint32_t>(at);
@@ -249,7 +246,7 @@ void Session::write_block(const Bytes& block, const std::function<void(std::size
 protocol::Status Session::restore() {
   const protocol::Status before = status();
   if (before.previous.bytes == 0) fail(std::string(protocol::text_of(Code::no_previous)));
-  ask<protocol::Reason>(Kind::block_restore, protocol::BlockRestore{before.sequence});
+  ask_at_rest(protocol::request(Kind::block_restore, 0, protocol::BlockRestore{before.sequence}));
   const protocol::Status after = status();
   if (after.active != before.previous) fail("another block is active than the one before; try again");
   return after;

@@ -47,6 +47,11 @@ class Session {
   }
   // The same, whatever its code.
   protocol::Message exchange(protocol::Message request);
+  // The same, of a request that a drive refuses while its shaft moves: a drive that was just switched on checks its
+  // sensors first, and then whether its shaft stands, so it is asked again for a while.
+  protocol::Message exchange_at_rest(const protocol::Message& request);
+  // The same; throws DriveError with the text of what was refused.
+  protocol::Message ask_at_rest(const protocol::Message& request) { return done(exchange_at_rest(request)); }
 
   // What the board states of itself: nothing where the firmware is older than that.
   control::Hardware hardware();
@@ -83,7 +88,6 @@ class Session {
 
  private:
   void wait_for_rest();
-  void ask_at_rest(const protocol::Message& request);
   protocol::CommandAnswer take_refusal(const protocol::Message& answer) const;
   protocol::Message done(const protocol::Message& answer) const;
 

@@ -18,8 +18,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using dfu::DfuError;
 
-// Until a device is back, whoever has to plug it in; and how long a drive may fall back after that.
-constexpr auto kPatience = std::chrono::seconds(60);
+constexpr auto kPatience = std::chrono::seconds(60);  // until a device is back, whoever has to plug it in
+// New firmware confirms itself after two seconds with a host (firmware/OPERATION.md).
+constexpr auto kTrial = std::chrono::seconds(4);
 constexpr auto kBetweenLooks = std::chrono::milliseconds(250);
 
 boot::Version version_of(const drive::Session& session) {
@@ -53,7 +54,7 @@ std::optional<boot::Version> installed_version(const std::string& serial) {
 }
 
 // The drive's version once it answers; none where it does not come back.
-std::optional<boot::Version> version_after(const std::string& serial) {
+std::optional<boot::Version> running_version(const std::string& serial) {
   std::optional<boot::Version> version;
   wait_until([&] {
     try {
@@ -67,6 +68,13 @@ std::optional<boot::Version> version_after(const std::string& serial) {
 }
 
 }  // namespace
+
+std::optional<boot::Version> version_after_trial(const std::function<std::optional<boot::Version>()>& look,
+                                                 const std::function<void()>& wait) {
+  if (!look()) return {};
+  wait();
+  return look();
+}
 
 Target find_target(const std::string& drive) {
   for (const char* other : {"tcp:", "serial:"})
@@ -138,7 +146,11 @@ boot::Version update(const Image& image, const Target& target,
     });
   }
   progress("waiting for the drive to start it");
-  const auto version = version_after(target.serial);
+  const auto version = version_after_trial([&] { return running_version(target.serial); },
+                                           [&] {
+                                             progress("waiting for the end of its trial");
+                                             std::this_thread::sleep_for(kTrial);
+                                           });
   if (!version)
     throw DfuError(
         fmt::format("drive {}: the image arrived whole, but the drive did not come back within {} s; switch "

@@ -27,9 +27,14 @@ Target find_target(const std::string& drive);
 // is sent.
 void require_fit(const Image& image, const Target& target, bool allow_older);
 
-// Brings the drive into its boot loader, sends the image and waits until the drive is back. Returns the version that
-// runs then: another one than the image's where the drive took it back. progress(what is being done). Throws DfuError
-// with where it stopped, and what to do.
+// The version that runs after the trial of a new image, which a drive may end by going back to the one before: `look`
+// waits for the drive's answer (none where it does not come back), `wait` lasts longer than a trial.
+std::optional<boot::Version> version_after_trial(const std::function<std::optional<boot::Version>()>& look,
+                                                 const std::function<void()>& wait);
+
+// Brings the drive into its boot loader, sends the image and waits until the drive is back and its trial over. Returns
+// the version that runs then: another one than the image's where the drive took it back. progress(what is being done).
+// Throws DfuError with where it stopped, and what to do.
 boot::Version update(const Image& image, const Target& target, const std::function<void(const std::string&)>& progress);
 
 }  // namespace flexspline::firmware_files

@@ -11,8 +11,7 @@
 #include "host/engine/estimation/filtered_signals.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/least_squares.hpp"
-#include "host/engine/estimation/prepared_again.hpp"
-#include "host/engine/estimation/zero_order_hold.hpp"
+#include "host/engine/estimation/linearised.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -79,30 +78,6 @@ std::vector<std::vector<SignalNoise>> draw_all(const Identification& found, std:
   return all;
 }
 
-// Columns of a balance's identified parameters and its residual, at the estimates.
-struct Linearised {
-  Eigen::MatrixXd J;
-  Eigen::VectorXd residual;
-};
-Linearised linearised(const RegressionProblem& data, const BalanceFit& fit, const Terms& terms,
-                      const std::vector<Eigen::Index>& identified) {
-  return {data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear)(Eigen::all, identified), data.residual(terms)};
-}
-
-// All balances of the same samples, from these experiments in place of the measured ones.
-std::vector<Linearised> of_others(const Identification& found, const std::vector<const data::Experiment*>& experiments,
-                                  const Pipeline& pipeline, const std::vector<std::vector<Eigen::Index>>& identified) {
-  PreparedData prepared = prepare_as(found.prepared, pipeline, experiments, found.terms);
-  for (std::size_t i = 0; i < prepared.records.size(); ++i)
-    take_decisions(prepared.records[i], found.prepared.records[i]);
-  std::vector<Linearised> result;
-  for (std::size_t b = 0; b < found.data.size(); ++b) {
-    RegressionProblem data(prepared, found.data[b].balance());
-    result.push_back(linearised(data, found.fits[b], found.terms, identified[b]));
-  }
-  return result;
-}
-
 std::vector<Linearised> with_noise(const Identification& found, const std::vector<std::vector<SignalNoise>>& noise,
                                    double factor, const std::vector<std::vector<Eigen::Index>>& identified) {
   std::vector<data::Experiment> noisy;
@@ -113,27 +88,7 @@ std::vector<Linearised> with_noise(const Identification& found, const std::vecto
   }
   std::vector<const data::Experiment*> experiments;
   for (const data::Experiment& e : noisy) experiments.push_back(&e);
-  return of_others(found, experiments, found.prepared.pipeline, identified);
-}
-
-// Whether values of a balance rest on what the motor's has to say as well (see combine_balances in identify.cpp): its
-// own samples alone may not determine them, and a step on those would be of any size.
-bool rests_on_motor_balance(const Identification& found, std::size_t b) {
-  if (found.data[b].balance() == Balance::motor) return false;
-  const auto adds = [&](const ParameterRef& ref) { return found.terms[ref.term].entry->adds_to(Balance::motor); };
-  return std::ranges::any_of(found.fits[b].linear, adds) || std::ranges::any_of(found.fits[b].nonlinear, adds);
-}
-
-// By balance, the parameters whose error is known.
-std::vector<std::vector<Eigen::Index>> identified_of(const Identification& found) {
-  std::vector<std::vector<Eigen::Index>> identified(found.fits.size());
-  for (std::size_t b = 0; b < found.fits.size(); ++b) {
-    if (rests_on_motor_balance(found, b)) continue;
-    const Eigen::MatrixXd& covariance = found.fits[b].covariance;
-    for (Eigen::Index j = 0; j < covariance.rows(); ++j)
-      if (std::isfinite(covariance(j, j))) identified[b].push_back(j);
-  }
-  return identified;
+  return linearised_with(found, experiments, found.prepared.pipeline, identified);
 }
 
 struct Changes {
@@ -182,8 +137,8 @@ double extrapolated_bias(double at_twice, double at_four_times) {
   return at_four_times / (two_to_p * two_to_p - 1.0);
 }
 
-std::vector<RegressorNoise> regressor_noise(Identification& found) {
-  const std::vector<std::vector<Eigen::Index>> identified = identified_of(found);
+std::vector<RegressorNoise> regressor_noise(const Identification& found) {
+  const std::vector<std::vector<Eigen::Index>> identified = parameters_with_errors(found);
   std::vector<Linearised> own;
   std::vector<LinearFit> fits;  // of the samples as they are
   std::vector<Changes> changes(found.fits.size());
@@ -217,29 +172,6 @@ std::vector<RegressorNoise> regressor_noise(Identification& found) {
     result.push_back(summarised(changes[b], fits[b].unit_covariance, identified[b], found.fits[b].covariance.rows()));
   }
   return result;
-}
-
-std::vector<Eigen::VectorXd> change_by_held_step(Identification& found) {
-  std::vector<Eigen::VectorXd> changes;
-  for (const BalanceFit& fit : found.fits) changes.emplace_back(Eigen::VectorXd::Zero(fit.covariance.rows()));
-  if (found.prepared.pipeline.torque_per_step != 0.0) return changes;
-  const HeldStep step = held_step(found.prepared);
-  if (!step.may_lack) return changes;
-  Pipeline corrected = found.prepared.pipeline;
-  corrected.torque_per_step = step.torque_per_step;
-  std::vector<const data::Experiment*> experiments;
-  for (const Record& record : found.prepared.records) experiments.push_back(record.experiment);
-  const auto identified = identified_of(found);
-  const std::vector<Linearised> others = of_others(found, experiments, corrected, identified);
-  for (std::size_t b = 0; b < found.fits.size(); ++b) {
-    if (identified[b].empty()) continue;
-    const Linearised own = linearised(found.data[b], found.fits[b], found.terms, identified[b]);
-    const auto estimate = [&](const Linearised& data) {
-      return generalised_least_squares(data.J, data.residual, found.fits[b].error_covariance).theta;
-    };
-    changes[b](identified[b]) = estimate(others[b]) - estimate(own);
-  }
-  return changes;
 }
 
 }  // namespace flexspline::estimation

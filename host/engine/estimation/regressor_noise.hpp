@@ -28,14 +28,10 @@ struct RegressorNoise {
 //
 // Noise of a position is what the encoder's steps leave of its smooth motion, with another zero of the encoder; white,
 // where it has more than that.
-std::vector<RegressorNoise> regressor_noise(Identification& identification);
+std::vector<RegressorNoise> regressor_noise(const Identification& identification);
 
 // A bias that grows with a power of the noise's variance from one half (noise that adds up by its magnitude) to one,
 // from the changes at twice and four times the variance.
 double extrapolated_bias(double at_twice, double at_four_times);
-
-// By how much the parameters of each balance change if readings of the torque lack half a step of a held effort (see
-// zero_order_hold.hpp) where noise hides whether they do; zero where that is known.
-std::vector<Eigen::VectorXd> change_by_held_step(Identification& identification);
 
 }  // namespace flexspline::estimation

@@ -1,11 +1,16 @@
 #include "host/engine/estimation/standard_intervals.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "host/common/numbers/distributions.hpp"
+#include "host/engine/estimation/effort_timing.hpp"
 #include "host/engine/estimation/regressor_noise.hpp"
 #include "host/input/data/finding.hpp"
 
@@ -50,12 +55,24 @@ std::vector<double> bias_of_cutoff(Identification& identification, const data::D
   return bias;
 }
 
-// What the measured signals do to one estimate: its bias, and the variance that its standard error has not counted.
+// What the measured signals do to one estimate: biases by their noise and by their timing, and the variance that its
+// standard error has not counted.
 struct OfSignals {
-  double bias = 0.0, variance = 0.0;
+  double noise_bias = 0.0, held_step_bias = 0.0, lag_bias = 0.0, variance = 0.0;
 };
-OfSignals of_signals(const Identification& found, const std::vector<RegressorNoise>& noise,
-                     const std::vector<Eigen::VectorXd>& of_held_step, const ParameterRef& ref) {
+
+// What follows from the signals of all records, by balance.
+struct SignalErrors {
+  explicit SignalErrors(const Identification& found)
+      : noise(regressor_noise(found)), held_step(change_by_held_step(found)), lag(effort_lag(found)) {}
+  OfSignals of(const Identification& found, const ParameterRef& ref) const;
+
+  std::vector<RegressorNoise> noise;
+  std::vector<Eigen::VectorXd> held_step;
+  std::optional<EffortLag> lag;
+};
+
+OfSignals SignalErrors::of(const Identification& found, const ParameterRef& ref) const {
   for (std::size_t b = 0; b < noise.size(); ++b) {
     std::vector<ParameterRef> all = found.fits[b].linear;
     all.insert(all.end(), found.fits[b].nonlinear.begin(), found.fits[b].nonlinear.end());
@@ -66,10 +83,20 @@ OfSignals of_signals(const Identification& found, const std::vector<RegressorNoi
     const auto size = [&](const Eigen::VectorXd& change) {
       return std::sqrt(std::max(variance(change * change.transpose()), 0.0));
     };
-    return {size(noise[b].bias) + size(of_held_step[b]),
+    return {size(noise[b].bias), size(held_step[b]), lag ? size(lag->change[b]) : 0.0,
             std::max(variance(noise[b].chance) - variance(noise[b].counted), 0.0)};
   }
   return {};
+}
+
+// `changed`: the estimate whose interval the lag widens most, by `bias`.
+std::string late_effort(const Identification& found, const EffortLag& lag, const Estimate& changed, double bias) {
+  return fmt::format(
+      "the {} is {:.2g} ms {} than the motion (standard error {:.2g} ms), or the model lacks an effect that looks like "
+      "it: {}.{} has an error of {:.2g} {} by that, which its interval counts; correct the time of the column, or see "
+      "`flexspline diagnose`",
+      found.prepared.effort_is_current ? "current" : "motor torque", 1e3 * std::abs(lag.lag_s),
+      lag.lag_s > 0.0 ? "later" : "earlier", 1e3 * lag.std_s, changed.id, changed.parameter, bias, changed.unit);
 }
 
 }  // namespace
@@ -92,17 +119,27 @@ Interval interval_95(double value, double std, double bias) {
 void count_biases(Identification& found, const data::Dataset& dataset, const model::Model& model,
                   const PipelineOptions& pipeline) {
   const std::vector<double> of_filters = bias_of_cutoff(found, dataset, model, pipeline);
-  const std::vector<RegressorNoise> noise = regressor_noise(found);
-  const std::vector<Eigen::VectorXd> of_held_step = change_by_held_step(found);
+  const SignalErrors signals(found);
+  constexpr double kWorthSaying = 0.01;  // of the value
+  const Estimate* most_changed = nullptr;
+  double most_errors = half_width_under_bias(0.0), most_bias = 0.0;
   for (std::size_t i = 0; i < found.estimates.size(); ++i) {
     Estimate& e = found.estimates[i];
     if (e.fixed || !e.std || !e.low || !e.high) continue;
-    const OfSignals of_columns = of_signals(found, noise, of_held_step, e.ref);
-    e.std = std::hypot(*e.std, std::sqrt(of_columns.variance));
-    const Interval wider = interval_95(e.value, *e.std, of_filters[i] + of_columns.bias);
+    const OfSignals own = signals.of(found, e.ref);
+    e.std = std::hypot(*e.std, std::sqrt(own.variance));
+    const Interval wider =
+        interval_95(e.value, *e.std, of_filters[i] + own.noise_bias + own.held_step_bias + own.lag_bias);
     e.low = std::min(*e.low, wider.low);
     e.high = std::max(*e.high, wider.high);
+    if (own.lag_bias > most_errors * *e.std && own.lag_bias > kWorthSaying * std::abs(e.value)) {
+      most_changed = &e;
+      most_errors = own.lag_bias / *e.std;
+      most_bias = own.lag_bias;
+    }
   }
+  if (most_changed != nullptr && signals.lag->is_certain())
+    found.warnings.push_back(late_effort(found, *signals.lag, *most_changed, most_bias));
   store(found.model, found.estimates);
 }
 
