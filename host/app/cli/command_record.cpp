@@ -162,8 +162,7 @@ planning::Plan plan_of(const RecordOptions& options, bool is_report) {
         "--full-velocity-rad-s and --full-current-a are for the report's plans; another plan has its own sizes");
   keep_runs(plan, options.runs);
   if (plan.runs.empty()) throw UsageError(options.plan.string() + ": the plan has no [[run]]: nothing to record");
-  if (!options.force && fs::exists(options.out) && !fs::is_empty(options.out))
-    throw UsageError(options.out.string() + ": is there and not empty; give another folder, or --force");
+  require_empty_folder(options.out, options.force);
   require_no_other_recordings(options.out, plan);
   require_person(plan, options.yes);
   return plan;

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "host/common/numbers/golden_section.hpp"
+
 namespace flexspline::signals {
 namespace {
 
@@ -112,7 +114,6 @@ Innovations innovations_at(std::span<const double> position, double h) {
 template <class Cost>
 double best_corner(const Cost& cost) {
   constexpr int kGrid = 24, kSections = 20;
-  constexpr double kGolden = 0.6180339887498949;
   const double low = std::log(kLowest), step = (std::log(kHighest) - low) / kGrid;
   double best = low, least = std::numeric_limits<double>::infinity();
   for (int k = 0; k <= kGrid; ++k)
@@ -120,25 +121,8 @@ double best_corner(const Cost& cost) {
       least = c;
       best = low + k * step;
     }
-  double a = best - step, b = best + step;
-  double x1 = b - kGolden * (b - a), x2 = a + kGolden * (b - a);
-  double c1 = cost(std::exp(x1)), c2 = cost(std::exp(x2));
-  for (int k = 0; k < kSections; ++k) {
-    if (c1 < c2) {
-      b = x2;
-      x2 = x1;
-      c2 = c1;
-      x1 = b - kGolden * (b - a);
-      c1 = cost(std::exp(x1));
-    } else {
-      a = x1;
-      x1 = x2;
-      c1 = c2;
-      x2 = a + kGolden * (b - a);
-      c2 = cost(std::exp(x2));
-    }
-  }
-  return std::exp(0.5 * (a + b));
+  return std::exp(numbers::golden_section(best - step, best + step, kSections,
+                                          [&](double log_corner) { return cost(std::exp(log_corner)); }));
 }
 
 void require(std::span<const double> position, double sample_s, std::size_t fewest) {

@@ -4,7 +4,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
 #include "host/common/algebra/decompositions.hpp"
+#include "host/common/numbers/golden_section.hpp"
 
 namespace flexspline::estimation {
 namespace {
@@ -37,30 +39,6 @@ OneGroup without_others(const RecordErrors& r, SmallVector std, Eigen::Index gro
   return {std::max(r.zz(group, group) / v - along.dot(weight), 0.0), r.ze[group] / v - error.dot(weight)};
 }
 
-// The middle of where a function of a logarithm is least, after ten golden sections (Kiefer 1953).
-template <class Function>
-double golden_section(double low, double high, const Function& at) {
-  constexpr double kGolden = 0.6180339887498949;
-  constexpr int kSections = 10;
-  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  double at_a = at(std::exp(a)), at_b = at(std::exp(b));
-  for (int k = 0; k < kSections; ++k)
-    if (at_a < at_b) {
-      high = b;
-      b = a;
-      at_b = at_a;
-      a = high - kGolden * (high - low);
-      at_a = at(std::exp(a));
-    } else {
-      low = a;
-      a = b;
-      at_a = at_b;
-      b = low + kGolden * (high - low);
-      at_b = at(std::exp(b));
-    }
-  return std::exp(0.5 * (low + high));
-}
-
 // The likeliest standard deviation of one group, the others as they are: a grid, then golden sections. Zero where that
 // is as likely.
 void choose_std(const std::vector<RecordErrors>& records, const std::vector<double>& noise, Eigen::Index group,
@@ -81,7 +59,10 @@ void choose_std(const std::vector<RecordErrors>& records, const std::vector<doub
       least = c;
       best = at;
     }
-  if (best > 0.0) best = golden_section(std::log(best / ratio), std::log(std::min(best * ratio, kLargestStd)), total);
+  constexpr int kSections = 10;
+  if (best > 0.0)
+    best = std::exp(numbers::golden_section(std::log(best / ratio), std::log(std::min(best * ratio, kLargestStd)),
+                                            kSections, [&](double log_std) { return total(std::exp(log_std)); }));
   std[group] = best;
 }
 
