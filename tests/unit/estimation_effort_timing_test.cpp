@@ -17,14 +17,14 @@ using data::Column;
 constexpr double kSample = 1e-3, kInertia = 1e-4, kViscous = 4e-3;
 
 // J a + b v of a velocity of three sines, as it was `lag_s` before.
-data::Dataset late_torque(double lag_s, std::uint64_t seed) {
+data::Dataset late_torque(double lag_s, std::uint64_t seed, data::CurrentHold hold = data::CurrentHold::none) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   data::Dataset dataset;
   data::Experiment& e = dataset.experiments.emplace_back();
   e.name = "three sines";
   e.load = data::Load::free;
-  e.current_hold = data::CurrentHold::none;
+  e.current_hold = hold;
   e.sample_s = kSample;
   const auto sum = [](double t, auto wave) {
     double value = 0.0;
@@ -80,9 +80,18 @@ TEST(EffortLag, LetsTheIntervalOfTheInertiaHoldItsTruthAndSaysSo) {
     with += holds();
     ASSERT_FALSE(found->warnings.empty());
     EXPECT_NE(found->warnings.back().find(" ms later than the motion"), std::string::npos) << found->warnings.back();
+    EXPECT_EQ(found->warnings.back().find("current_hold"), std::string::npos) << found->warnings.back();
   }
   EXPECT_EQ(without, 0);
   EXPECT_GE(with, 9);
+}
+
+TEST(EffortLag, OfHalfASampleIsSaidToBeThatOfAMeasuredEffortThatIsTakenForHeld) {
+  const data::Dataset dataset = late_torque(0.0, 1, data::CurrentHold::zoh);
+  const auto found = identify(dataset, rigid_drive(), kOptions);
+  count_biases(*found, dataset, rigid_drive(), kOptions);
+  ASSERT_FALSE(found->warnings.empty());
+  EXPECT_NE(found->warnings.back().find("state current_hold = none"), std::string::npos) << found->warnings.back();
 }
 
 TEST(EffortLag, WidensNoIntervalByMuchAndSaysNothingWhereThereIsNone) {

@@ -89,14 +89,28 @@ OfSignals SignalErrors::of(const Identification& found, const ParameterRef& ref)
   return {};
 }
 
+// An effort that is taken for held is aligned by half a sample, by which a measured one then seems later.
+std::string remedy_for(const Identification& found, const EffortLag& lag) {
+  for (const Record& record : found.prepared.records) {
+    const double half_s = 0.5 * record.sample_s;
+    if (record.experiment->current_hold == data::CurrentHold::zoh && std::abs(lag.lag_s - half_s) < 0.5 * half_s)
+      return fmt::format(
+          "if it is measured, not a command that is held for a sample, state current_hold = none (a command is "
+          "assumed, "
+          "which is {:.2g} ms earlier); else correct the time of the column",
+          1e3 * half_s);
+  }
+  return "correct the time of the column";
+}
+
 // `changed`: the estimate whose interval the lag widens most, by `bias`.
 std::string late_effort(const Identification& found, const EffortLag& lag, const Estimate& changed, double bias) {
   return fmt::format(
       "the {} is {:.2g} ms {} than the motion (standard error {:.2g} ms), or the model lacks an effect that looks like "
-      "it: {}.{} has an error of {:.2g} {} by that, which its interval counts; correct the time of the column, or see "
-      "`flexspline diagnose`",
+      "it: {}.{} has an error of {:.2g} {} by that, which its interval counts; {}, or see `flexspline diagnose`",
       found.prepared.effort_is_current ? "current" : "motor torque", 1e3 * std::abs(lag.lag_s),
-      lag.lag_s > 0.0 ? "later" : "earlier", 1e3 * lag.std_s, changed.id, changed.parameter, bias, changed.unit);
+      lag.lag_s > 0.0 ? "later" : "earlier", 1e3 * lag.std_s, changed.id, changed.parameter, bias, changed.unit,
+      remedy_for(found, lag));
 }
 
 }  // namespace
