@@ -36,10 +36,21 @@ std::string ending_of_recording(const std::string& name) {
   return ending;
 }
 
+// Loggers call each of their files the same: the second of a name gets a number.
+std::string free_name(const fs::path& folder, const std::string& name) {
+  const std::size_t compressed = name.ends_with(".gz") ? name.size() - 3 : name.size();  // "log.csv.gz"
+  const std::size_t stem = std::min(name.rfind('.', compressed - 1), compressed);
+  std::string free = name;
+  for (int number = 2; fs::exists(folder / free); ++number)
+    free = fmt::format("{}-{}{}", name.substr(0, stem), number, name.substr(stem));
+  return free;
+}
+
 std::vector<fs::path> write(const fs::path& folder, const std::vector<Upload>& files) {
   std::vector<fs::path> written;
   for (const Upload& file : files) {
-    const fs::path path = inside(folder, file.name, ending_of_recording(file.name));
+    inside(folder, file.name, ending_of_recording(file.name));
+    const fs::path path = folder / free_name(folder, file.name);
     std::ofstream out(path, std::ios::binary);
     out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
     if (!out.flush()) throw std::runtime_error("the files could not be stored: is the disk full?");
@@ -73,10 +84,14 @@ std::string names_of(const std::vector<fs::path>& files) {
   return files.size() > 3 ? fmt::format("{} and {} more", names, files.size() - 3) : names;
 }
 
-Choices like(const model::Drive& drive) {
-  Choices choices;
-  choices.gear_ratio = drive.gear_ratio.value;
-  choices.torque_constant_nm_a = drive.torque_constant_nm_a.value;
+// Recordings that are added are of the drive of the model: what the user does not state is as there.
+Choices with_facts_of(const Session& session, Choices choices) {
+  const std::shared_ptr<Step> now = session.history().current();
+  if (!now) return choices;
+  const model::Drive& drive = now->model.drive;
+  if (!choices.gear_ratio) choices.gear_ratio = drive.gear_ratio.value;
+  if (!choices.torque_constant_nm_a) choices.torque_constant_nm_a = drive.torque_constant_nm_a.value;
+  if (choices.axis.empty() && drive.axis == data::Axis::linear) choices.axis = "linear";
   return choices;
 }
 
@@ -98,21 +113,25 @@ std::vector<fs::path> Api::recordings_for(const fs::path& folder) const {
   return files;
 }
 
-void Api::start_proposal(const std::shared_ptr<Session>& session, const Choices& choices) {
+void Api::start_proposal(const std::shared_ptr<Session>& session, const json& body) {
+  const Choices choices = with_facts_of(*session, choices_of(body));
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.propose || (!folder && setup_.data.empty()))
     throw UnknownNameError("there are no recordings to begin with; drop some");
   session->start("Reading the recordings",
-                 [this, choices, folder = folder.value_or(""), session = session.get()](const Progress& progress) {
+                 [this, choices, given = body.value("choices", json()), folder = folder.value_or(""),
+                  session = session.get()](const Progress& progress) {
                    progress("");
                    json proposal = setup_.projects.propose(recordings_for(folder), choices);
                    proposal["adds"] = session->has_model();
+                   proposal["choices"] = given;  // a page that is loaded again goes on with them
                    progress("");
                    session->set("proposal", std::move(proposal));
                  });
 }
 
-void Api::start_project(const std::shared_ptr<Session>& session, const Choices& choices) {
+void Api::start_project(const std::shared_ptr<Session>& session, const Choices& stated) {
+  const Choices choices = with_facts_of(*session, stated);
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.make || (!folder && setup_.data.empty()))
     throw UnknownNameError("there are no recordings to begin with; drop some");
@@ -168,7 +187,7 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
         return store_all_tabs();
       } catch (const data::DataError&) {
         try {
-          if (setup_.projects.propose) proposal = propose(like(now->model.drive));
+          if (setup_.projects.propose) proposal = propose(with_facts_of(*session, {}));
         } catch (const std::runtime_error&) {
           // The first error is more useful.
         }
