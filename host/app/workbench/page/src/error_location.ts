@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import { get, unpack, type Experiment, type Packed, type State } from "./api";
 import { announce, bar, button, el, fill, num, times, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, kHidden, line, shade, stretchedScale, stretchedSplits } from "./plots";
-import { badness, balanceInView, inNoise, viewChanged, view } from "./store";
+import { badness, balanceInView, inNoise, stepKey, viewChanged, view, type Brush } from "./store";
 
 interface Means { mean: (number | null)[]; standard_error: (number | null)[] }
 interface Map1 {
@@ -35,9 +35,10 @@ export class ErrorLocation {
   private bin = -1;
   private state: State | null = null;
   private problem = "";
+  private marks = 0;
 
   // `shown`: once the maps of a step are there, or cannot be.
-  constructor(private readonly shown: () => void) {
+  constructor(private readonly shown: () => void, private readonly complain: (error: Error) => void) {
     this.figure.holder.addEventListener("keydown", (e) => this.pressed(e));
     this.list.addEventListener("keydown", (e) => {
       const rows = Array.from(this.list.querySelectorAll<HTMLElement>("[role=option]"));
@@ -52,7 +53,7 @@ export class ErrorLocation {
 
   render(state: State): void {
     this.state = state;
-    const key = [state.at, state.steps.length, state.steps[state.at]?.what].join("|");
+    const key = stepKey(state);
     if (key !== this.key) {
       this.key = key;
       this.maps = this.before = null;
@@ -124,7 +125,7 @@ export class ErrorLocation {
     const brushed = view.brush?.variable === map.variable ? view.brush : null;
     fill(this.head, el("strong", {}, `Over ${name(map.variable)}`),
       el("span", { class: "soft clip" }, brushed ? `marked: ${num(brushed.low, 3)} to ${num(brushed.high, 3)} ${unit(map.unit)}` : share(map) >= 0.5 ? `${num(share(map), 2)} % of the squared error depends on it` : "the error does not depend on it"),
-      brushed ? button("Clear", () => { view.brush = null; viewChanged(); }) : null,
+      brushed ? button("Clear", () => this.clear()) : null,
       el("span", { class: "choice" }, toggle("error", false), toggle("× direction", true)));
     const up = (m: Means, n: number) => m.mean.map((v, k) => { const s = m.standard_error[k]; return v === null || s === null || s === undefined ? null : v + n * s; });
     const noise = map.noise.map((v) => (v === null ? null : 2 * v));
@@ -155,7 +156,16 @@ export class ErrorLocation {
   }
 
   private async brush(map: Map1, signal: string, low: number, high: number): Promise<void> {
-    const list = await get<{ experiment: string; rows: number; stretches: [number, number][] }[]>("stretches", { signal, variable: map.variable, low, high });
+    // A key that is held down marks one region after the other: the last one counts, whichever answer comes first.
+    const mark = ++this.marks, key = this.key;
+    let list: Brush["list"];
+    try {
+      list = await get<Brush["list"]>("stretches", { signal, variable: map.variable, low, high });
+    } catch (error) {
+      if (mark === this.marks && key === this.key) this.complain(error as Error);
+      return;
+    }
+    if (mark !== this.marks || key !== this.key) return;
     view.brush = { variable: map.variable, low, high, unit: map.unit, list };
     view.signal = signal;
     const most = [...list].sort((a, b) => b.rows - a.rows)[0];
@@ -164,10 +174,17 @@ export class ErrorLocation {
     viewChanged();
   }
 
+  private clear(): void {
+    ++this.marks;
+    view.brush = null;
+    this.bin = -1;
+    viewChanged();
+  }
+
   private pressed(e: KeyboardEvent): void {
     const state = this.state, signal = state ? balanceInView(state)?.signal ?? "" : "";
     const map = this.maps?.maps.find((m) => m.signal === signal)?.maps.find((m) => m.variable === this.variable);
-    if (e.key === "Escape") { view.brush = null; this.bin = -1; viewChanged(); }
+    if (e.key === "Escape") this.clear();
     if (!map || (e.key !== "ArrowLeft" && e.key !== "ArrowRight")) return;
     e.preventDefault();
     const bins = map.edges.length - 1;
@@ -194,13 +211,14 @@ export class ErrorLocation {
   private drawLoop(): void {
     const loop = this.maps?.loops.find((l) => l.experiment === view.experiment) ?? this.maps?.loops[0];
     if (!loop) return;
-    fill(this.head, el("strong", {}, "Torque over torsion"), el("span", { class: "soft clip" }, loop.experiment), el("ul", { class: "key" }, el("li", { class: "measured" }, "measured"), el("li", { class: "model" }, "model")));
+    const effort = loop.unit === "N" ? "force" : "torque";
+    fill(this.head, el("strong", {}, `${effort === "force" ? "Force" : "Torque"} over torsion`), el("span", { class: "soft clip" }, loop.experiment), el("ul", { class: "key" }, el("li", { class: "measured" }, "measured"), el("li", { class: "model" }, "model")));
     this.figure.holder.setAttribute("aria-label", `Hysteresis loop of ${loop.experiment}`);
     const torsion = unpack(loop.torsion), measured = unpack(loop.measured), model = unpack(loop.model);
     this.figure.show(() => ({
       data: [null, [torsion, measured], [torsion, model]] as unknown as uPlot.AlignedData,
       options: {
-        mode: 2, axes: axes(`torsion (${unit(loop.torsion_unit)})`, `torque (${unit(loop.unit)})`), scales: { x: { time: false }, y: {} },
+        mode: 2, axes: axes(`torsion (${unit(loop.torsion_unit)})`, `${effort} (${unit(loop.unit)})`), scales: { x: { time: false }, y: {} },
         series: [{}, { ...line("measured"), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: trace("measured") } as unknown as uPlot.Series,
           { ...line("model"), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: trace("model", [7, 4]) } as unknown as uPlot.Series] as uPlot.Series[],
         cursor: { drag: { x: false, y: false }, points: { show: false } },
@@ -214,7 +232,7 @@ export class ErrorLocation {
     fill(this.head, el("strong", {}, "By record"), el("span", { class: "soft clip" }, byNoise ? "error over the noise" : "error"));
     const sorted = [...those].sort((a, b) => of(b) - of(a));
     const worst = Math.max(byNoise ? 1 : 0, ...sorted.map(of));
-    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(worst > 0 ? of(e) / worst : 0, byNoise && of(e) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, byNoise ? times(of(e)) : withUnit(of(e), unitOf(e), 3)))));
+    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(worst > 0 ? of(e) / worst : 0, byNoise && of(e) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, of(e) < 0 ? "–" : byNoise ? times(of(e)) : withUnit(of(e), unitOf(e), 3)))));
   }
 }
 
