@@ -329,7 +329,7 @@ function frictionFigure(f, title, top) {
       const name = signalName(b.signal);
       const shows = b.maps.filter((m) => Math.max(m.share_percent, m.share_with_direction_percent) >= 5).slice(0, 6);
       const rest = b.maps.filter((m) => !shows.includes(m));
-      s.append(el("h3", {}, name[0].toUpperCase() + name.slice(1) + (shows.length ? ", most telling first" : "")));
+      s.append(el("h3", {}, name[0].toUpperCase() + name.slice(1) + (shows.length ? ", largest share first" : "")));
       const draw = (maps, into) => {
         const grid = el("div", { class: "grid" });
         for (const m of maps) {
