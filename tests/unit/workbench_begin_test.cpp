@@ -160,6 +160,15 @@ TEST_F(WorkbenchBegin, ForeignRecordingsInATabWithAModelAreAskedForAndAdded) {
   // Those that are left out are forgotten.
   ASSERT_EQ(drop(tab, "third.csv", log()), 200);
   EXPECT_TRUE(settled(tab).contains("proposal"));
+  // One that comes while columns are chosen joins those that wait for them; one that cannot be read does not.
+  ASSERT_EQ(drop(tab, "fourth.csv", log()), 200);
+  EXPECT_TRUE(settled(tab).contains("proposal"));
+  EXPECT_EQ(files_.size(), 2u);
+  ASSERT_EQ(drop(tab, "broken.csv", "?"), 200);
+  EXPECT_TRUE(settled(tab).contains("problem"));
+  act(tab, {{"do", "propose"}});
+  settled(tab);
+  EXPECT_EQ(files_.size(), 2u);
   act(tab, {{"do", "forget"}});
   EXPECT_FALSE(settled(tab).contains("proposal"));
   act(tab, {{"do", "begin"}}, 400);

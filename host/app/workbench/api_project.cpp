@@ -95,6 +95,25 @@ Choices with_facts_of(const Session& session, Choices choices) {
   return choices;
 }
 
+// Null where the files were added, else what is to be chosen for them.
+json add_or_propose(Session& session, const fs::path& folder, const estimation::PipelineOptions& pipeline,
+                    const std::function<json(const Choices&)>& propose, const Progress& progress) {
+  try {
+    const std::shared_ptr<Step> next = with_files(*session.history().current(), folder, {}, pipeline, progress);
+    session.change([&](auto& history) { history.take(next); });
+    return nullptr;
+  } catch (const data::DataError&) {
+    json proposal;
+    try {
+      proposal = propose(with_facts_of(session, {}));
+    } catch (const std::runtime_error&) {
+      // The first error is more useful.
+    }
+    if (proposal.is_null() || !is_foreign(proposal)) throw;
+    return proposal;
+  }
+}
+
 }  // namespace
 
 fs::path Api::new_folder() {
@@ -168,40 +187,25 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
   }
   if (session->works()) throw BusyError("something is still running; wait, or cancel it");
   const bool adds = session->has_model();
-  // Recordings to begin with may come one after the other.
-  const std::optional<fs::path> before = adds ? std::nullopt : proposed(*session);
+  // Recordings whose columns are not chosen yet may come one after the other.
+  const std::optional<fs::path> before = proposed(*session);
   const fs::path folder = before && !before->empty() ? *before : new_folder();
   const std::vector<fs::path> written = write(folder, files);
   const std::string what = fmt::format("Reading {} file{}", files.size(), files.size() == 1 ? "" : "s");
-  const auto propose = [this, folder, session = session.get()](const Choices& choices) {
+  const auto propose = [this, folder](const Choices& choices) {
     return setup_.projects.propose ? setup_.projects.propose(recordings_for(folder), choices)
                                    : throw UnknownNameError("there is no model yet");
   };
   session->start(what, [this, adds, folder, written, propose, session = session.get()](const Progress& progress) {
     json proposal;
-    if (adds) {
-      const std::shared_ptr<Step> now = session->history().current();
-      try {
-        const std::shared_ptr<Step> next = with_files(*now, folder, {}, setup_.pipeline, progress);
-        session->change([&](auto& history) { history.take(next); });
-        return store_all_tabs();
-      } catch (const data::DataError&) {
-        try {
-          if (setup_.projects.propose) proposal = propose(with_facts_of(*session, {}));
-        } catch (const std::runtime_error&) {
-          // The first error is more useful.
-        }
-        if (proposal.is_null() || !is_foreign(proposal)) throw;
-      }
-    } else {
+    try {
       progress("");
-      try {
-        proposal = propose({});
-      } catch (...) {
-        for (const fs::path& file : written) fs::remove(file);
-        throw;
-      }
+      proposal = adds ? add_or_propose(*session, folder, setup_.pipeline, propose, progress) : propose({});
+    } catch (...) {
+      for (const fs::path& file : written) fs::remove(file);
+      throw;
     }
+    if (proposal.is_null()) return store_all_tabs();
     proposal["adds"] = adds;
     progress("");
     session->store("recordings", folder.string());

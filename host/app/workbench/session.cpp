@@ -189,6 +189,7 @@ void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>&
   parts_->erase("pack");
   parts_->erase("saved");
   parts_->erase("proposal");
+  stored_.erase("recordings");
   parts_->erase("flash_preview");
   parts_->erase("problem");
   changed();

@@ -15,7 +15,8 @@ interface Maps { maps: { signal: string; unit: string; maps: Map1[] }[]; loops: 
 
 const kNames: Record<string, string> = { motor_angle: "motor angle (within a turn)", output_angle: "output angle", velocity: "velocity", speed: "speed", travel: "travel since reversal",
   torsion_rate: "torsion rate", time: "time", record: "record", orders: "orders of the motor's turn", loop: "hysteresis loop" };
-const name = (variable: string) => kNames[variable] ?? words(variable);
+// Map variables are named as on the axis: `axis` is the unit of the error, a force on a linear one.
+const name = (variable: string, axis: string) => (axis === "N" && variable === "output_angle" ? "output position" : axis === "N" && variable === "torque" ? "force" : kNames[variable] ?? words(variable));
 const share = (m: Map1) => Math.max(m.share_percent, m.share_with_direction_percent);
 const kCrowded = ["velocity", "speed", "torsion_rate", "travel"];
 
@@ -107,7 +108,7 @@ export class ErrorLocation {
     if (!entries.some(([v]) => v === this.variable)) this.variable = entries[0]?.[0] ?? "record";
     fill(this.list, entries.map(([v, percent]) => el("div", { role: "option", tabindex: v === this.variable ? 0 : -1, "aria-selected": v === this.variable ? "true" : "false", "data-key": `over ${v}`, "data-variable": v,
         click: () => { this.variable = v; this.directed = null; this.bin = -1; this.draw(); } },
-      el("span", { class: "name" }, name(v)), el("span", { class: "figure" }, percent === null ? "" : percent >= 0.5 ? `${num(percent, 2)} %` : "–"), percent === null ? null : bar(percent / 100, "bad"))));
+      el("span", { class: "name" }, name(v, of.unit)), el("span", { class: "figure" }, percent === null ? "" : percent >= 0.5 ? `${num(percent, 2)} %` : "–"), percent === null ? null : bar(percent / 100, "bad"))));
     this.element.dataset.variable = this.variable;
     this.figure.holder.hidden = this.variable === "record";
     this.records.hidden = this.variable !== "record";
@@ -123,7 +124,7 @@ export class ErrorLocation {
     const means = directed ? map.with_direction : map.plain;
     const toggle = (text: string, value: boolean) => button(text, () => { this.directed = value; this.draw(); }, { "aria-pressed": directed === value ? "true" : "false" });
     const brushed = view.brush?.variable === map.variable ? view.brush : null;
-    fill(this.head, el("strong", {}, `Over ${name(map.variable)}`),
+    fill(this.head, el("strong", {}, `Over ${name(map.variable, ofUnit)}`),
       el("span", { class: "soft clip" }, brushed ? `marked: ${num(brushed.low, 3)} to ${num(brushed.high, 3)} ${unit(map.unit)}` : share(map) >= 0.5 ? `${num(share(map), 2)} % of the squared error depends on it` : "the error does not depend on it"),
       brushed ? button("Clear", () => this.clear()) : null,
       el("span", { class: "choice" }, toggle("error", false), toggle("× direction", true)));
@@ -132,12 +133,12 @@ export class ErrorLocation {
     const old = before && before.x.length === map.x.length ? (directed ? before.with_direction : before.plain).mean : null;
     const scale: Partial<uPlot.Scale> = kCrowded.includes(map.variable) ? stretchedScale(map.x) : { time: false };
     const asinh = scale.distr === 4 ? scale.asinh ?? 1 : 0;
-    this.figure.holder.setAttribute("aria-label", `Mean error over ${name(map.variable)} with its spread. Left and right mark a region, Escape clears it.`);
+    this.figure.holder.setAttribute("aria-label", `Mean error over ${name(map.variable, ofUnit)} with its spread. Left and right mark a region, Escape clears it.`);
     this.figure.show(() => ({
       data: [map.x, noise, noise.map((v) => (v === null ? null : -v)), up(means, 2), up(means, -2), means.mean, ...(old ? [old] : [])] as uPlot.AlignedData,
       options: {
         scales: { x: scale as uPlot.Scale },
-        axes: axes(`${name(map.variable)}${map.unit ? ` (${unit(map.unit)})` : ""}`, `error (${unit(ofUnit)})`,
+        axes: axes(`${name(map.variable, ofUnit)}${map.unit ? ` (${unit(map.unit)})` : ""}`, `error (${unit(ofUnit)})`,
           asinh ? { x: { splits: (_u, _a, low, high) => stretchedSplits(asinh, low, high), filter: (_u, splits) => splits } } : {}),
         series: [{}, kHidden, kHidden, kHidden, kHidden, line(directed ? "model" : "residual", { points: { show: true, size: 5 } }), ...(old ? [line("before", { dash: [4, 4] })] : [])],
         bands: [{ series: [1, 2], fill: colour("noise") }, { series: [3, 4], fill: colour(directed ? "modelband" : "residualband") }],
