@@ -211,6 +211,9 @@ TEST_F(WorkbenchApi, SavesIntoItsFolderAloneAndReplacesOnlyWhenTold) {
   for (const char* name : {"../x.toml", "/tmp/x.toml", "x.sh", ".x.toml", "a/b.toml"})
     act(tab, {{"do", "save"}, {"what", "model"}, {"name", name}}, 400);
   act(tab, {{"do", "save"}, {"what", "passwd"}, {"name", "x.toml"}}, 400);
+  // Another model is not the one that was saved.
+  act(tab, {{"do", "refit"}});
+  EXPECT_FALSE(settled(tab).contains("saved"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
 }
 

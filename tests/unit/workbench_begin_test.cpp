@@ -147,13 +147,28 @@ TEST_F(WorkbenchBegin, ForeignRecordingsInATabWithAModelAreAskedForAndAdded) {
   const json asked = settled(tab);
   EXPECT_TRUE(asked["proposal"]["adds"].get<bool>()) << asked.dump();
   EXPECT_EQ(choices_.torque_constant_nm_a, 0.1) << "the drive is known by now";
+  // Also where the user has chosen a column: only what is stated takes the place of the drive's facts.
+  act(tab, {{"do", "propose"}, {"choices", {{"map", {"current_a=i"}}, {"torque_constant_nm_a", 0.2}}}});
+  settled(tab);
+  EXPECT_EQ(choices_.gear_ratio, 100.0);
+  EXPECT_EQ(choices_.torque_constant_nm_a, 0.2);
   act(tab, {{"do", "begin"}});
   const json state = settled(tab);
+  EXPECT_EQ(choices_.gear_ratio, 100.0);
   EXPECT_EQ(state["steps"].size(), 2u) << state.dump();
   EXPECT_EQ(state["experiments"].size(), before + 1);
   // Those that are left out are forgotten.
   ASSERT_EQ(drop(tab, "third.csv", log()), 200);
   EXPECT_TRUE(settled(tab).contains("proposal"));
+  // One that comes while columns are chosen joins those that wait for them; one that cannot be read does not.
+  ASSERT_EQ(drop(tab, "fourth.csv", log()), 200);
+  EXPECT_TRUE(settled(tab).contains("proposal"));
+  EXPECT_EQ(files_.size(), 2u);
+  ASSERT_EQ(drop(tab, "broken.csv", "?"), 200);
+  EXPECT_TRUE(settled(tab).contains("problem"));
+  act(tab, {{"do", "propose"}});
+  settled(tab);
+  EXPECT_EQ(files_.size(), 2u);
   act(tab, {{"do", "forget"}});
   EXPECT_FALSE(settled(tab).contains("proposal"));
   act(tab, {{"do", "begin"}}, 400);
@@ -170,6 +185,32 @@ TEST_F(WorkbenchBegin, AFileThatCannotBeReadIsNotInTheWayOfTheNext) {
   EXPECT_EQ(files_.size(), 1u);
   EXPECT_EQ(drop(tab, "run.sh", "#!"), 400);
   EXPECT_EQ(drop(tab, "dataset.toml", ""), 400);
+}
+
+TEST_F(WorkbenchBegin, ASecondFileOfTheSameNameDoesNotReplaceTheFirst) {
+  const std::string tab = new_tab();
+  ASSERT_EQ(drop(tab, "log.csv", log()), 200);
+  settled(tab);
+  ASSERT_EQ(drop(tab, "log.csv", "t,i,q\n0,1,2\n"), 200);
+  settled(tab);
+  ASSERT_EQ(files_.size(), 2u);
+  EXPECT_EQ(files_[0].filename(), "log-2.csv");
+  EXPECT_EQ(files_[1].filename(), "log.csv");
+  EXPECT_EQ(fs::file_size(files_[1]), log().size());
+  const Answer both = api_->answer({"POST", "/api/drop", {{"tab", tab}}, "", {{"a.csv.gz", "1"}, {"a.csv.gz", "2"}}});
+  ASSERT_EQ(both.status, 200) << both.body;
+  settled(tab);
+  ASSERT_EQ(files_.size(), 4u);
+  EXPECT_EQ(files_[0].filename(), "a-2.csv.gz");
+}
+
+TEST_F(WorkbenchBegin, AProposalHoldsTheChoicesForAPageThatIsLoadedAgain) {
+  const std::string tab = new_tab();
+  ASSERT_EQ(drop(tab, "log.csv", log()), 200);
+  settled(tab);
+  const json choices = {{"map", {"current_a=i"}}, {"page", {{"facts", {{"gear_ratio", "100"}}}}}};
+  act(tab, {{"do", "propose"}, {"choices", choices}});
+  EXPECT_EQ(settled(tab)["proposal"]["choices"], choices);
 }
 
 TEST_F(WorkbenchBegin, ChoicesOfTheWrongKindAreRefused) {

@@ -68,6 +68,8 @@ try {
     await page.dispatchEvent("body", "drop", { dataTransfer: transfer });
     await page.waitForSelector("[data-column=current_a] .sparkline");
     await idle(page);
+    await page.locator("[data-fact=gear_ratio]").fill("1:100");
+    await until(page, () => /Gear ratio: .1:100. is not a number/.test(document.querySelector(".note").textContent));
     await page.locator("[data-fact=gear_ratio]").fill("100");
     await until(page, () => document.querySelector(".beginning").dataset.can === "no");
     await shot("2-asked");
@@ -85,6 +87,13 @@ try {
     await shot("3-chosen");
     await fits("the choice of columns");
     await accessible(page, "columns");
+    // A page that is loaded again goes on with what was chosen.
+    await page.reload();
+    await page.waitForSelector("[data-column=current_a] .sparkline");
+    assert.equal(await page.locator("[data-fact=gear_ratio]").inputValue(), "100");
+    // Keys for steps do not take the columns away.
+    await page.keyboard.press("Control+z");
+    await idle(page);
     await page.locator("[data-begin]").click();
     await page.waitForSelector("body[data-step='0']");
     await page.waitForSelector(".time[data-drawn]");

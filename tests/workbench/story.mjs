@@ -237,6 +237,13 @@ try {
   const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Download model" }).click()]);
   assert.equal(download.suggestedFilename(), "flexspline-model.toml");
   await shot(page, "7-saved");
+  // A file that cannot be made is a message on the page, not a page of its own.
+  await page.route("**/api/file*", (route) => route.fulfill({ status: 400, contentType: "application/json", body: '{"what": "it cannot be packed"}' }));
+  await page.getByRole("button", { name: "Download block" }).click();
+  await until(page, () => /it cannot be packed/.test(document.querySelector(".note").textContent));
+  await page.unroute("**/api/file*");
+  await page.getByRole("button", { name: "Dismiss" }).click();
+  complaints.splice(0, complaints.length, ...complaints.filter((c) => !/status of 400/.test(c)));
 
   say("the closed loop: cancelled midway, then to its end");
   await page.getByRole("tab", { name: "Closed loop" }).click();

@@ -125,7 +125,7 @@ void declare(Parser& parser, HilOptions& options) {
 
 closed_loop::Comparison run_closed_loop(const HilOptions& options, Console& console) {
   if (options.seconds != 0.0 && options.seconds < 1.1)
-    throw UsageError("--seconds has to be above 1.1: the first second fades the motion in and is not scored");
+    throw UsageError("--seconds has to be at least 1.1: the first second fades the motion in and is not scored");
   if (options.draws != 0 && (options.draws < 3 || options.draws > 200))
     throw UsageError("--draws has to be 0, or 3 to 200");
   require_report_place(options.report);

@@ -14,6 +14,7 @@
 #include "host/app/workbench/stored_tabs.hpp"
 #include "host/app/workbench/work.hpp"
 #include "host/engine/estimation/cancellation.hpp"
+#include "host/output/answers/identification.hpp"
 
 namespace flexspline::workbench {
 namespace {
@@ -186,7 +187,7 @@ std::shared_ptr<Session> Api::open_tab(const std::string& like) {
     }
   tabs_.push_front(made);
   if (tabs_.size() > kMostTabs) tabs_.pop_back();
-  if (!made->has_model() && !setup_.data.empty()) start_proposal(made, {});
+  if (!made->has_model() && !setup_.data.empty()) start_proposal(made, json::object());
   return made;
 }
 
@@ -269,7 +270,7 @@ json Api::act(const std::shared_ptr<Session>& session, const json& body) {
 
 bool Api::act_on_project(const std::shared_ptr<Session>& session, const std::string& what, const json& body) {
   if (what == "propose") {
-    start_proposal(session, choices_of(body));
+    start_proposal(session, body);
   } else if (what == "begin") {
     start_project(session, choices_of(body));
   } else if (what == "forget") {
@@ -325,8 +326,10 @@ bool Api::act_on_model(const std::shared_ptr<Session>& session, const std::strin
 bool Api::act_on_drive(const std::shared_ptr<Session>& session, const std::string& what, const json& body) {
   if (what == "connect") {
     const std::string drive = field(body, "drive");
-    session->start("Connecting", [this, drive](const Progress& progress) {
+    session->start("Connecting", [this, drive, session = session.get()](const Progress& progress) {
       progress(drive);
+      session->set("flash", nullptr);  // of the drive before
+      session->set("flash_preview", nullptr);
       drive_.connect(drive);
     });
   } else if (what == "disconnect") {
@@ -344,13 +347,14 @@ bool Api::act_on_drive(const std::shared_ptr<Session>& session, const std::strin
   } else if (what == "flash" || what == "restore") {
     // A drive is changed only as shown in the preview.
     const PreviewedBlocks shown{field(body, "before"), field(body, "after")};
+    session->start(what == "flash" ? "Flashing" : "Restoring",
+                   [this, what, shown, session = session.get()](const Progress& progress) {
+                     const std::shared_ptr<Step> step = session->history().current();
+                     session->set("flash", nullptr);  // it stays so where this fails
+                     if (what == "restore") return static_cast<void>(drive_.restore(shown));
+                     session->set("flash", drive_.flash(step->model, progress, shown));
+                   });
     session->set("flash_preview", nullptr);
-    session->start(what == "flash" ? "Flashing" : "Restoring", [this, what, shown,
-                                                                session = session.get()](const Progress& progress) {
-      const std::shared_ptr<Step> step = session->history().current();
-      if (what == "restore") drive_.restore(shown);
-      session->set("flash", what == "flash" ? drive_.flash(step->model, progress, shown) : json(nullptr));
-    });
   } else if (what == "move") {
     session->start("Moving the twin", [this](const Progress& progress) { drive_.move(progress); });
   } else if (what == "empty-map") {
@@ -397,9 +401,11 @@ void Api::start_diagnosis(const std::shared_ptr<Session>& session) {
 void Api::start_pack(const std::shared_ptr<Session>& session) {
   session->start("Packing", [session = session.get()](const Progress& progress) {
     progress("proving the block and comparing it with double");
-    const deployment::Packed packed = deployment::pack(session->history().current()->model);
+    const model::Model model = session->history().current()->model;
+    json packed = pack_json(deployment::pack(model));
+    packed["unit"] = output::torque_unit(model.drive.axis);
     progress("");
-    session->set("pack", pack_json(packed));
+    session->set("pack", std::move(packed));
   });
 }
 

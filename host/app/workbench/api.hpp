@@ -86,7 +86,7 @@ class Api {
   void start_save(const std::shared_ptr<Session>& session, const nlohmann::json& body);
   void start_drop(const std::shared_ptr<Session>& session, const std::vector<Upload>& files);
   // Of the recordings that were dropped last, or that the workbench was started with.
-  void start_proposal(const std::shared_ptr<Session>& session, const Choices& choices);
+  void start_proposal(const std::shared_ptr<Session>& session, const nlohmann::json& body);
   void start_project(const std::shared_ptr<Session>& session, const Choices& choices);
   std::vector<std::filesystem::path> recordings_for(const std::filesystem::path& folder) const;
   std::filesystem::path new_folder();

@@ -36,10 +36,21 @@ std::string ending_of_recording(const std::string& name) {
   return ending;
 }
 
+// Loggers call each of their files the same: the second of a name gets a number.
+std::string free_name(const fs::path& folder, const std::string& name) {
+  const std::size_t compressed = name.ends_with(".gz") ? name.size() - 3 : name.size();  // "log.csv.gz"
+  const std::size_t stem = std::min(name.rfind('.', compressed - 1), compressed);
+  std::string free = name;
+  for (int number = 2; fs::exists(folder / free); ++number)
+    free = fmt::format("{}-{}{}", name.substr(0, stem), number, name.substr(stem));
+  return free;
+}
+
 std::vector<fs::path> write(const fs::path& folder, const std::vector<Upload>& files) {
   std::vector<fs::path> written;
   for (const Upload& file : files) {
-    const fs::path path = inside(folder, file.name, ending_of_recording(file.name));
+    inside(folder, file.name, ending_of_recording(file.name));
+    const fs::path path = folder / free_name(folder, file.name);
     std::ofstream out(path, std::ios::binary);
     out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
     if (!out.flush()) throw std::runtime_error("the files could not be stored: is the disk full?");
@@ -73,11 +84,34 @@ std::string names_of(const std::vector<fs::path>& files) {
   return files.size() > 3 ? fmt::format("{} and {} more", names, files.size() - 3) : names;
 }
 
-Choices like(const model::Drive& drive) {
-  Choices choices;
-  choices.gear_ratio = drive.gear_ratio.value;
-  choices.torque_constant_nm_a = drive.torque_constant_nm_a.value;
+// Recordings that are added are of the drive of the model: what the user does not state is as there.
+Choices with_facts_of(const Session& session, Choices choices) {
+  const std::shared_ptr<Step> now = session.history().current();
+  if (!now) return choices;
+  const model::Drive& drive = now->model.drive;
+  if (!choices.gear_ratio) choices.gear_ratio = drive.gear_ratio.value;
+  if (!choices.torque_constant_nm_a) choices.torque_constant_nm_a = drive.torque_constant_nm_a.value;
+  if (choices.axis.empty() && drive.axis == data::Axis::linear) choices.axis = "linear";
   return choices;
+}
+
+// Null where the files were added, else what is to be chosen for them.
+json add_or_propose(Session& session, const fs::path& folder, const estimation::PipelineOptions& pipeline,
+                    const std::function<json(const Choices&)>& propose, const Progress& progress) {
+  try {
+    const std::shared_ptr<Step> next = with_files(*session.history().current(), folder, {}, pipeline, progress);
+    session.change([&](auto& history) { history.take(next); });
+    return nullptr;
+  } catch (const data::DataError&) {
+    json proposal;
+    try {
+      proposal = propose(with_facts_of(session, {}));
+    } catch (const std::runtime_error&) {
+      // The first error is more useful.
+    }
+    if (proposal.is_null() || !is_foreign(proposal)) throw;
+    return proposal;
+  }
 }
 
 }  // namespace
@@ -98,21 +132,25 @@ std::vector<fs::path> Api::recordings_for(const fs::path& folder) const {
   return files;
 }
 
-void Api::start_proposal(const std::shared_ptr<Session>& session, const Choices& choices) {
+void Api::start_proposal(const std::shared_ptr<Session>& session, const json& body) {
+  const Choices choices = with_facts_of(*session, choices_of(body));
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.propose || (!folder && setup_.data.empty()))
     throw UnknownNameError("there are no recordings to begin with; drop some");
   session->start("Reading the recordings",
-                 [this, choices, folder = folder.value_or(""), session = session.get()](const Progress& progress) {
+                 [this, choices, given = body.value("choices", json()), folder = folder.value_or(""),
+                  session = session.get()](const Progress& progress) {
                    progress("");
                    json proposal = setup_.projects.propose(recordings_for(folder), choices);
                    proposal["adds"] = session->has_model();
+                   proposal["choices"] = given;  // a page that is loaded again goes on with them
                    progress("");
                    session->set("proposal", std::move(proposal));
                  });
 }
 
-void Api::start_project(const std::shared_ptr<Session>& session, const Choices& choices) {
+void Api::start_project(const std::shared_ptr<Session>& session, const Choices& stated) {
+  const Choices choices = with_facts_of(*session, stated);
   const std::optional<fs::path> folder = proposed(*session);
   if (!setup_.projects.make || (!folder && setup_.data.empty()))
     throw UnknownNameError("there are no recordings to begin with; drop some");
@@ -149,40 +187,25 @@ void Api::start_drop(const std::shared_ptr<Session>& session, const std::vector<
   }
   if (session->works()) throw BusyError("something is still running; wait, or cancel it");
   const bool adds = session->has_model();
-  // Recordings to begin with may come one after the other.
-  const std::optional<fs::path> before = adds ? std::nullopt : proposed(*session);
+  // Recordings whose columns are not chosen yet may come one after the other.
+  const std::optional<fs::path> before = proposed(*session);
   const fs::path folder = before && !before->empty() ? *before : new_folder();
   const std::vector<fs::path> written = write(folder, files);
   const std::string what = fmt::format("Reading {} file{}", files.size(), files.size() == 1 ? "" : "s");
-  const auto propose = [this, folder, session = session.get()](const Choices& choices) {
+  const auto propose = [this, folder](const Choices& choices) {
     return setup_.projects.propose ? setup_.projects.propose(recordings_for(folder), choices)
                                    : throw UnknownNameError("there is no model yet");
   };
   session->start(what, [this, adds, folder, written, propose, session = session.get()](const Progress& progress) {
     json proposal;
-    if (adds) {
-      const std::shared_ptr<Step> now = session->history().current();
-      try {
-        const std::shared_ptr<Step> next = with_files(*now, folder, {}, setup_.pipeline, progress);
-        session->change([&](auto& history) { history.take(next); });
-        return store_all_tabs();
-      } catch (const data::DataError&) {
-        try {
-          if (setup_.projects.propose) proposal = propose(like(now->model.drive));
-        } catch (const std::runtime_error&) {
-          // The first error is more useful.
-        }
-        if (proposal.is_null() || !is_foreign(proposal)) throw;
-      }
-    } else {
+    try {
       progress("");
-      try {
-        proposal = propose({});
-      } catch (...) {
-        for (const fs::path& file : written) fs::remove(file);
-        throw;
-      }
+      proposal = adds ? add_or_propose(*session, folder, setup_.pipeline, propose, progress) : propose({});
+    } catch (...) {
+      for (const fs::path& file : written) fs::remove(file);
+      throw;
     }
+    if (proposal.is_null()) return store_all_tabs();
     proposal["adds"] = adds;
     progress("");
     session->store("recordings", folder.string());

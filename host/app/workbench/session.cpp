@@ -27,7 +27,8 @@ json diagnosis_json(const selection::Diagnosis& found) {
 }
 
 json step_json(const Step& step) {
-  return {{"action", step.action},
+  return {{"id", step.id},
+          {"action", step.action},
           {"what", step.what},
           {"balances", (*step.errors)["balances"]},
           {"effects", [&] {
@@ -186,7 +187,9 @@ void Session::change(const std::function<void(History<std::shared_ptr<Step>>&)>&
   for (std::size_t k = 0; k < history_.size(); ++k)
     if (history_[k] && (k > history_.at() || k + 1 < history_.at())) history_[k]->discard_view();
   parts_->erase("pack");
+  parts_->erase("saved");
   parts_->erase("proposal");
+  stored_.erase("recordings");
   parts_->erase("flash_preview");
   parts_->erase("problem");
   changed();

@@ -62,7 +62,7 @@ function fillUnknown(s, c) {
   const name = variableName(c.variable), what = c.times_direction ? "times the direction of motion" : "";
   s.append(figure({
     title: `What no effect explains, over ${name}`, height: 240,
-    label: `Torque over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error on data left out of the fit`,
+    label: `${kEffort} over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error on data left out of the fit`,
     caption: el("span", {}, el("strong", {}, `${number(c.chi2_fall_percent, 3)} %`), ` less squared error on data left out of its fit with this curve${what ? ", " + what : ""}`),
     key: [{ name: "learnt curve", colour: "residual" }, { name: "95 % of it", colour: "residual", kind: "band" }],
     make: (k, plot) => ({
@@ -73,7 +73,7 @@ function fillUnknown(s, c) {
         series: [{}, kHidden, kHidden, line("residual", k, { width: 2 })],
         bands: [{ series: [1, 2], fill: faded("residual") }],
         cursor: { drag: { x: false, y: false }, y: false },
-        hooks: { drawClear: [zeroHook(k)], setCursor: [readoutHook(plot, [null, null, "torque"], unit, "at", xUnit)] },
+        hooks: { drawClear: [zeroHook(k)], setCursor: [readoutHook(plot, [null, null, effort], unit, "at", xUnit)] },
       },
     }),
   }));

@@ -40,6 +40,10 @@ const kVariableNames = {
   torsion_rate: "rate of torsion", temperature: "temperature", time: "time since the record began",
   travel: "travel since the last reversal", direction: "direction of motion", record: "experiment",
 };
+// Forces on a linear axis. The page of hil has no maps.
+const isLinear = (report.maps || []).some((b) => b.unit === "N");
+const effort = isLinear ? "force" : "torque", kEffort = isLinear ? "Force" : "Torque";
+if (isLinear) Object.assign(kVariableNames, { output_angle: "output position", torque: "force through the gear" });
 // "velocity x direction" and "motor_angle order 7" in words.
 function variableName(variable) {
   const directed = variable.endsWith(" x direction");

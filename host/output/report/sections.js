@@ -271,7 +271,7 @@ function loopFigure(loop) {
   const facets = [{ scale: "x", auto: true }, { scale: "y", auto: true }];
   return figure({
     title: loop.experiment, half: true, height: 260,
-    label: `Torque through the gear against torsion in ${loop.experiment}, measured and modelled`,
+    label: `${kEffort} through the gear against torsion in ${loop.experiment}, measured and modelled`,
     caption: loop.locked ? "output locked" : "output free",
     make: (k) => ({
       data: [null, [x, measured], [x, model]],
@@ -294,7 +294,7 @@ function frictionFigure(f, title, top) {
   const up = (n) => f.measured.map((v, k) => (v === null ? null : v + n * f.standard_error[k]));
   const dashes = [null, [8, 3], [2, 3], [8, 3, 2, 3], [4, 2], [1, 2]];
   return figure({
-    title, label: `Friction torque over motor velocity, ${title}: measured, modelled, and each effect of the model alone`, height: 320,
+    title, label: `Friction ${effort} over motor velocity, ${title}: measured, modelled, and each effect of the model alone`, height: 320,
     key: [{ name: "measured (the motor balance less what is no friction), ±2 standard errors", colour: "measured", kind: "point" }, { name: "model", colour: "model" },
       ...f.parts.map((p, k) => ({ name: p.id, colour: "part-" + (k % 6), dash: dashes[k % 6] }))],
     make: (k, plot) => ({
@@ -329,7 +329,7 @@ function frictionFigure(f, title, top) {
       const name = signalName(b.signal);
       const shows = b.maps.filter((m) => Math.max(m.share_percent, m.share_with_direction_percent) >= 5).slice(0, 6);
       const rest = b.maps.filter((m) => !shows.includes(m));
-      s.append(el("h3", {}, name[0].toUpperCase() + name.slice(1) + (shows.length ? ", most telling first" : "")));
+      s.append(el("h3", {}, name[0].toUpperCase() + name.slice(1) + (shows.length ? ", largest share first" : "")));
       const draw = (maps, into) => {
         const grid = el("div", { class: "grid" });
         for (const m of maps) {
@@ -344,7 +344,7 @@ function frictionFigure(f, title, top) {
         s.append(folded(shows.length ? `${rest.length} more quantities, with less or nothing to see` : `The maps of all ${rest.length} quantities`, false, (body) => draw(rest, body)));
     }
     if (report.loops.length) {
-      s.append(el("h3", {}, "Torque against torsion"),
+      s.append(el("h3", {}, `${kEffort} against torsion`),
         el("p", {}, "Twisting the gear to and fro draws a loop: its slope is the stiffness, its width is energy that is lost. Where the two lines part, stiffness or hysteresis are not modelled rightly."),
         el("ul", { class: "key" }, [{ name: "measured", colour: "measured" }, { name: "model", colour: "model", dash: [6, 3] }].map(keyItem)));
       s.append(el("div", { class: "grid" }, report.loops.map(loopFigure)));

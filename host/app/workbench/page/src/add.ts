@@ -67,7 +67,7 @@ export class Add {
         el("div", { class: "big", "data-excess": excess === null ? "" : excess.toFixed(4) }, before ? el("span", { class: "was" }, excess !== null ? times(excessOf(before)) : withUnit(errorOf(before), before.unit), " → ") : null, excess !== null ? times(excess) : now ? withUnit(errorOf(now), now.unit) : "–"),
         el("p", {}, excess !== null ? "the noise: " : "", el("strong", {}, `error of the ${words(about)}`), now?.holdout !== null && now ? " on motions that the fit never saw" : " on fitted data (none are held out)",
           now ? `: ${withUnit(errorOf(now), now.unit)}${floorOf(now) ? `; noise alone ${withUnit(floorOf(now), now.unit)}` : ""}` : "")),
-      el("ol", { class: "history", "aria-label": "Steps" }, state.steps.map((s, k) => el("li", { class: k === state.at ? "now" : k > state.at ? "later" : "", "aria-current": k === state.at ? "step" : null },
+      el("ol", { class: "history", "data-scroll": "steps", "aria-label": "Steps" }, state.steps.map((s, k) => el("li", { class: k === state.at ? "now" : k > state.at ? "later" : "", "aria-current": k === state.at ? "step" : null },
         el("button", { type: "button", "data-key": `step ${k}`, "data-step": k, disabled: state.work !== null, click: () => this.run("go", { step: k }), title: k === state.at ? "the present model" : "go to this step" },
           el("span", { class: "name" }, title(s)), el("span", { class: "figure" }, figure(of(s))), bar(length(of(s)), (excessOf(of(s)) ?? 9) <= 1.3 ? "fine" : "bad"))))),
       el("div", { class: "row actions" }, button("Undo", () => this.run("undo"), { disabled: state.at === 0 || state.work !== null, title: "Ctrl+Z" }), button("Redo", () => this.run("redo"), { disabled: state.at + 1 >= state.steps.length || state.work !== null, title: "Ctrl+Y" }),
@@ -98,9 +98,9 @@ export class Add {
       el("label", { class: "row" }, "Name ", input),
       el("div", { class: "row actions" }, kinds.map(([what, ending, text]) => button(text, () => void this.save_(what, `${input.value}${ending}`), { "data-save": what, disabled: state.work !== null }))),
       el("p", { class: "soft" }, `Into ${state.folder}`), state.saved ? el("p", { class: "done", "data-saved": state.saved.what }, `✓ ${state.saved.file}`) : null,
-      el("div", { class: "row actions" }, "Download: ", [...kinds.map(([what]) => what), ...(state.has_dataset_text ? ["dataset"] : [])].map((what) => button(what, () => download(what), { class: "quiet", "aria-label": `Download ${what}`, "data-key": `download ${what}`, title: what === "dataset" ? "dataset.toml: which column is which, to be kept in the folder of the recordings" : "" }))),
+      el("div", { class: "row actions" }, "Download: ", [...kinds.map(([what]) => what), ...(state.has_dataset_text ? ["dataset"] : [])].map((what) => button(what, () => void download(what).catch((error: Error) => this.run("complain", { what: error.message })), { class: "quiet", "aria-label": `Download ${what}`, "data-key": `download ${what}`, title: what === "dataset" ? "dataset.toml: which column is which, to be kept in the folder of the recordings" : "" }))),
       el("div", { class: "row actions" }, button("Pack for a drive", () => this.run("pack"), { "data-pack": "", disabled: state.work !== null }),
-        p ? el("span", { class: "done", "data-packed": "" }, `${p.bytes} bytes; fixed point is off by at most ${num(p.max_error_nm, 3)} N·m, ${num(100 * p.max_error_share_of_rated, 2)} % of rated torque (${words(p.worst_balance)} balance); ${p.bounds} bounds proven`) : null));
+        p ? el("span", { class: "done", "data-packed": "" }, `${p.bytes} bytes; fixed point is off by at most ${withUnit(p.max_error_nm, p.unit, 3)}, ${num(100 * p.max_error_share_of_rated, 2)} % of rated ${p.unit === "N" ? "force" : "torque"} (${words(p.worst_balance)} balance); ${p.bounds} bounds proven`) : null));
   }
 
   private async save_(what: string, name: string): Promise<void> {

@@ -1,4 +1,6 @@
 // The server: what it answers, and the tab's place with it.
+import { saveAs } from "./dom";
+
 export interface Signal {
   signal: string; unit: string; rmse: number | null; nrmse: number | null; noise_floor: number | null; excess: number | null; free_run: boolean;
 }
@@ -9,7 +11,7 @@ export interface Balance {
   signal: string; unit: string; fit: number | null; holdout: number | null; noise_floor_fit: number | null; noise_floor_holdout: number | null;
   noise_floor_from: string;
 }
-export interface Step { action: string; what: string; balances: Balance[]; effects: string[] }
+export interface Step { id: string; action: string; what: string; balances: Balance[]; effects: string[] }
 export interface Parameter {
   id: string; effect: string; parameter: string; value: number | null; unit: string; std: number | null; interval: [number | null, number | null];
   spread_percent: number | null; reliable: boolean | null; identifiable: boolean;
@@ -46,7 +48,7 @@ export interface State {
   warnings: string[]; steps: Step[]; at: number; parameters: Parameter[]; diagnosis: Diagnosis | null;
   works_started: number;
   work: { what: string; stage: string; seconds: number } | null; problem?: Problem;
-  pack?: { bytes: number; sha256: string; max_error_nm: number; max_error_share_of_rated: number; worst_balance: string; bounds: number };
+  pack?: { bytes: number; sha256: string; max_error_nm: number; max_error_share_of_rated: number; worst_balance: string; bounds: number; unit: string };
   saved?: { what: string; file: string }; flash?: Flash;
   scenarios: string[]; rig: string; closed_loop?: ClosedLoop;
   parameters_before: { id: string; parameter: string; value: number | null }[]; has_dataset_text?: boolean; proposal?: Proposal; flash_preview?: FlashPreview;
@@ -61,7 +63,13 @@ export interface Proposal {
   signals: { name: string; unit: string; low?: (number | null)[]; high?: (number | null)[]; least?: number | null; largest?: number | null }[];
   axis: string; position_side: string; question: string; joints: number[]; joint: number | null; needs_pole_pairs: string; gear_ratio: number | null; torque_constant_nm_a: number | null;
   encoder_counts: number | null; notes: string[]; warnings: string[]; effects: string[]; reasons: string[]; can_begin: boolean; why_not: string; has_dataset_toml: boolean;
+  choices?: { page?: PageChoices } | null;
   findings: { file: string; line: number; column: string; what: string; remedy: string; tolerate: string | null }[];
+}
+
+// What was chosen on the page, which is sent with each proposal: a page that is loaded again goes on with it.
+export interface PageChoices {
+  chosen: [string, { source: string | null; unit: string }][]; facts: Record<string, string>; tolerated: string[]; turned: string[]; left: string[];
 }
 
 // Errors in rad, currents in A; see host/output/answers/JSON.md.
@@ -86,7 +94,8 @@ async function answer(response: Response): Promise<unknown> {
   if (response.ok) return JSON.parse(text);
   let what = text;
   try { what = (JSON.parse(text) as { what: string }).what; } catch { /* plain text */ }
-  throw new Refusal(response.status, what);
+  if (response.status === 413) what = "These are more than the workbench takes at a time (1 GB): send fewer files, or shorter ones.";
+  throw new Refusal(response.status, what || `The workbench answers with the status ${response.status}.`);
 }
 
 function address(path: string, query: Record<string, string | number> = {}): string {
@@ -110,10 +119,11 @@ export async function sendFiles(files: File[]): Promise<void> {
   await answer(await fetch(address("drop"), { method: "POST", body: form }));
 }
 
-export function download(what: string): void {
-  const link = document.createElement("a");
-  link.href = address("file", { what });
-  link.click();
+// A link to the file would show a refusal in place of the page.
+export async function download(what: string): Promise<void> {
+  const response = await fetch(address("file", { what }));
+  if (!response.ok) await answer(response);
+  saveAs(await response.blob(), /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? what);
 }
 
 // A reload finds its tab again; a tab that was duplicated gets one of its own, which begins with the other's step.

@@ -48,7 +48,7 @@ export class ClosedLoopPanel {
     const head = (text: string, n = true) => el("th", { scope: "col", class: n ? "n" : "" }, text);
     const predicted = runs.some((r) => r.predicted);
     return el("table", { class: isOld ? "old" : "", "data-runs": runs.length, "data-ratio": (runs[runs.length - 1]?.ratio_to_none ?? 1).toFixed(4), "data-base": (runs[1]?.ratio_to_none ?? 1).toFixed(4) },
-      el("thead", {}, el("tr", {}, head("compensation", false), head("rms error, mrad"), head("peak"), head("ratio to none"), predicted ? head("predicted") : null, head("rms current, A"), runs.some((r) => r.fault) ? head("fault", false) : null)),
+      el("thead", {}, el("tr", {}, head("compensation", false), head("rms error, mrad"), head("peak, mrad"), head("ratio to none"), predicted ? head("predicted") : null, head("rms current, A"), runs.some((r) => r.fault) ? head("fault", false) : null)),
       el("tbody", {}, runs.map((r) => el("tr", {}, el("th", { scope: "row", class: `line ${kLines[r.compensation]?.[0] ?? ""}` }, name(r, runs)), el("td", { class: "n" }, num(kMilli * (r.rms_error_rad ?? NaN), 3)), el("td", { class: "n" }, num(kMilli * (r.peak_error_rad ?? NaN), 3)), el("td", { class: "n" }, num(r.ratio_to_none, 3)),
         predicted ? el("td", { class: "n", title: "what was predicted before the run, with 95 %" }, r.predicted ? `${num(r.predicted.interval[0], 2)} to ${num(r.predicted.interval[1], 2)}` : "–") : null, el("td", { class: "n" }, num(r.rms_current_a, 3)),
         r.fault ? el("td", { class: "high" }, `${words(r.fault)}${r.ends_in_fault ? ", switched off" : ""}`) : null))));

@@ -75,6 +75,7 @@ export function num(value: number | null | undefined, digits = 4): string {
 }
 
 export function unit(text: string): string {
+  if (text === "1") return "";
   return text.replace(/\*/g, "·").replace(/\^2/g, "²").replace(/\^3/g, "³").replace("degC", "°C");
 }
 
@@ -108,6 +109,13 @@ export function bar(share: number, kind: string): HTMLElement {
 
 export function button(text: string, press: () => void, attributes: Attributes = {}): HTMLButtonElement {
   return el("button", { type: "button", click: press, "data-key": text, ...attributes }, text);
+}
+
+// Content that the browser saves as a file.
+export function saveAs(content: Blob, name: string): void {
+  const href = URL.createObjectURL(content);
+  el("a", { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10_000);
 }
 
 // For screen readers.

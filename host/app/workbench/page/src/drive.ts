@@ -98,7 +98,7 @@ export class DrivePanel {
         el("ul", { class: "reach" }, this.status.in_reach.map((d) => el("li", {}, button(`Connect ${d.drive}`, () => this.run("connect", { drive: d.drive }), { disabled: off || !d.usable, "data-connect": d.drive }), el("span", { class: "soft" }, d.usable ? d.what : d.problem)))));
       return;
     }
-    const f = s.came_back ? undefined : state.flash;  // what it has in it now may be something else
+    const f = s.came_back || state.flash?.drive !== s.serial ? undefined : state.flash;  // what it has in it now may be something else
     const p = state.flash_preview;  // the server flashes nothing but what it shows
     fill(this.head, el("p", {}, el("strong", {}, `${s.serial} `), el("span", { class: "soft" }, `${s.board}; ${s.block ? `block “${s.block.model}”, ${s.block.bytes} bytes` : "no block"}`)),
       el("div", { class: "row actions" }, button("Flash this model", () => this.run("preview-flash"), { class: p ? "" : "main", disabled: off, "data-flash": "" }), button("Go back to the block before", () => this.run("preview-restore"), { disabled: off, "data-restore": "" }), button("Disconnect", () => { this.status = null; this.run("disconnect"); }, { class: "quiet", disabled: off })),

@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import { get, unpack, type Experiment, type Packed, type State } from "./api";
 import { announce, bar, button, el, fill, num, times, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, kHidden, line, shade, stretchedScale, stretchedSplits } from "./plots";
-import { badness, balanceInView, inNoise, viewChanged, view } from "./store";
+import { badness, balanceInView, inNoise, stepKey, viewChanged, view, type Brush } from "./store";
 
 interface Means { mean: (number | null)[]; standard_error: (number | null)[] }
 interface Map1 {
@@ -15,7 +15,8 @@ interface Maps { maps: { signal: string; unit: string; maps: Map1[] }[]; loops: 
 
 const kNames: Record<string, string> = { motor_angle: "motor angle (within a turn)", output_angle: "output angle", velocity: "velocity", speed: "speed", travel: "travel since reversal",
   torsion_rate: "torsion rate", time: "time", record: "record", orders: "orders of the motor's turn", loop: "hysteresis loop" };
-const name = (variable: string) => kNames[variable] ?? words(variable);
+// Map variables are named as on the axis: `axis` is the unit of the error, a force on a linear one.
+const name = (variable: string, axis: string) => (axis === "N" && variable === "output_angle" ? "output position" : axis === "N" && variable === "torque" ? "force" : kNames[variable] ?? words(variable));
 const share = (m: Map1) => Math.max(m.share_percent, m.share_with_direction_percent);
 const kCrowded = ["velocity", "speed", "torsion_rate", "travel"];
 
@@ -35,9 +36,10 @@ export class ErrorLocation {
   private bin = -1;
   private state: State | null = null;
   private problem = "";
+  private marks = 0;
 
   // `shown`: once the maps of a step are there, or cannot be.
-  constructor(private readonly shown: () => void) {
+  constructor(private readonly shown: () => void, private readonly complain: (error: Error) => void) {
     this.figure.holder.addEventListener("keydown", (e) => this.pressed(e));
     this.list.addEventListener("keydown", (e) => {
       const rows = Array.from(this.list.querySelectorAll<HTMLElement>("[role=option]"));
@@ -52,7 +54,7 @@ export class ErrorLocation {
 
   render(state: State): void {
     this.state = state;
-    const key = [state.at, state.steps.length, state.steps[state.at]?.what].join("|");
+    const key = stepKey(state);
     if (key !== this.key) {
       this.key = key;
       this.maps = this.before = null;
@@ -106,7 +108,7 @@ export class ErrorLocation {
     if (!entries.some(([v]) => v === this.variable)) this.variable = entries[0]?.[0] ?? "record";
     fill(this.list, entries.map(([v, percent]) => el("div", { role: "option", tabindex: v === this.variable ? 0 : -1, "aria-selected": v === this.variable ? "true" : "false", "data-key": `over ${v}`, "data-variable": v,
         click: () => { this.variable = v; this.directed = null; this.bin = -1; this.draw(); } },
-      el("span", { class: "name" }, name(v)), el("span", { class: "figure" }, percent === null ? "" : percent >= 0.5 ? `${num(percent, 2)} %` : "–"), percent === null ? null : bar(percent / 100, "bad"))));
+      el("span", { class: "name" }, name(v, of.unit)), el("span", { class: "figure" }, percent === null ? "" : percent >= 0.5 ? `${num(percent, 2)} %` : "–"), percent === null ? null : bar(percent / 100, "bad"))));
     this.element.dataset.variable = this.variable;
     this.figure.holder.hidden = this.variable === "record";
     this.records.hidden = this.variable !== "record";
@@ -122,21 +124,21 @@ export class ErrorLocation {
     const means = directed ? map.with_direction : map.plain;
     const toggle = (text: string, value: boolean) => button(text, () => { this.directed = value; this.draw(); }, { "aria-pressed": directed === value ? "true" : "false" });
     const brushed = view.brush?.variable === map.variable ? view.brush : null;
-    fill(this.head, el("strong", {}, `Over ${name(map.variable)}`),
+    fill(this.head, el("strong", {}, `Over ${name(map.variable, ofUnit)}`),
       el("span", { class: "soft clip" }, brushed ? `marked: ${num(brushed.low, 3)} to ${num(brushed.high, 3)} ${unit(map.unit)}` : share(map) >= 0.5 ? `${num(share(map), 2)} % of the squared error depends on it` : "the error does not depend on it"),
-      brushed ? button("Clear", () => { view.brush = null; viewChanged(); }) : null,
+      brushed ? button("Clear", () => this.clear()) : null,
       el("span", { class: "choice" }, toggle("error", false), toggle("× direction", true)));
     const up = (m: Means, n: number) => m.mean.map((v, k) => { const s = m.standard_error[k]; return v === null || s === null || s === undefined ? null : v + n * s; });
     const noise = map.noise.map((v) => (v === null ? null : 2 * v));
     const old = before && before.x.length === map.x.length ? (directed ? before.with_direction : before.plain).mean : null;
     const scale: Partial<uPlot.Scale> = kCrowded.includes(map.variable) ? stretchedScale(map.x) : { time: false };
     const asinh = scale.distr === 4 ? scale.asinh ?? 1 : 0;
-    this.figure.holder.setAttribute("aria-label", `Mean error over ${name(map.variable)} with its spread. Left and right mark a region, Escape clears it.`);
+    this.figure.holder.setAttribute("aria-label", `Mean error over ${name(map.variable, ofUnit)} with its spread. Left and right mark a region, Escape clears it.`);
     this.figure.show(() => ({
       data: [map.x, noise, noise.map((v) => (v === null ? null : -v)), up(means, 2), up(means, -2), means.mean, ...(old ? [old] : [])] as uPlot.AlignedData,
       options: {
         scales: { x: scale as uPlot.Scale },
-        axes: axes(`${name(map.variable)}${map.unit ? ` (${unit(map.unit)})` : ""}`, `error (${unit(ofUnit)})`,
+        axes: axes(`${name(map.variable, ofUnit)}${map.unit ? ` (${unit(map.unit)})` : ""}`, `error (${unit(ofUnit)})`,
           asinh ? { x: { splits: (_u, _a, low, high) => stretchedSplits(asinh, low, high), filter: (_u, splits) => splits } } : {}),
         series: [{}, kHidden, kHidden, kHidden, kHidden, line(directed ? "model" : "residual", { points: { show: true, size: 5 } }), ...(old ? [line("before", { dash: [4, 4] })] : [])],
         bands: [{ series: [1, 2], fill: colour("noise") }, { series: [3, 4], fill: colour(directed ? "modelband" : "residualband") }],
@@ -155,7 +157,16 @@ export class ErrorLocation {
   }
 
   private async brush(map: Map1, signal: string, low: number, high: number): Promise<void> {
-    const list = await get<{ experiment: string; rows: number; stretches: [number, number][] }[]>("stretches", { signal, variable: map.variable, low, high });
+    // A key that is held down marks one region after the other: the last one counts, whichever answer comes first.
+    const mark = ++this.marks, key = this.key;
+    let list: Brush["list"];
+    try {
+      list = await get<Brush["list"]>("stretches", { signal, variable: map.variable, low, high });
+    } catch (error) {
+      if (mark === this.marks && key === this.key) this.complain(error as Error);
+      return;
+    }
+    if (mark !== this.marks || key !== this.key) return;
     view.brush = { variable: map.variable, low, high, unit: map.unit, list };
     view.signal = signal;
     const most = [...list].sort((a, b) => b.rows - a.rows)[0];
@@ -164,10 +175,17 @@ export class ErrorLocation {
     viewChanged();
   }
 
+  private clear(): void {
+    ++this.marks;
+    view.brush = null;
+    this.bin = -1;
+    viewChanged();
+  }
+
   private pressed(e: KeyboardEvent): void {
     const state = this.state, signal = state ? balanceInView(state)?.signal ?? "" : "";
     const map = this.maps?.maps.find((m) => m.signal === signal)?.maps.find((m) => m.variable === this.variable);
-    if (e.key === "Escape") { view.brush = null; this.bin = -1; viewChanged(); }
+    if (e.key === "Escape") this.clear();
     if (!map || (e.key !== "ArrowLeft" && e.key !== "ArrowRight")) return;
     e.preventDefault();
     const bins = map.edges.length - 1;
@@ -194,13 +212,14 @@ export class ErrorLocation {
   private drawLoop(): void {
     const loop = this.maps?.loops.find((l) => l.experiment === view.experiment) ?? this.maps?.loops[0];
     if (!loop) return;
-    fill(this.head, el("strong", {}, "Torque over torsion"), el("span", { class: "soft clip" }, loop.experiment), el("ul", { class: "key" }, el("li", { class: "measured" }, "measured"), el("li", { class: "model" }, "model")));
+    const effort = loop.unit === "N" ? "force" : "torque";
+    fill(this.head, el("strong", {}, `${effort === "force" ? "Force" : "Torque"} over torsion`), el("span", { class: "soft clip" }, loop.experiment), el("ul", { class: "key" }, el("li", { class: "measured" }, "measured"), el("li", { class: "model" }, "model")));
     this.figure.holder.setAttribute("aria-label", `Hysteresis loop of ${loop.experiment}`);
     const torsion = unpack(loop.torsion), measured = unpack(loop.measured), model = unpack(loop.model);
     this.figure.show(() => ({
       data: [null, [torsion, measured], [torsion, model]] as unknown as uPlot.AlignedData,
       options: {
-        mode: 2, axes: axes(`torsion (${unit(loop.torsion_unit)})`, `torque (${unit(loop.unit)})`), scales: { x: { time: false }, y: {} },
+        mode: 2, axes: axes(`torsion (${unit(loop.torsion_unit)})`, `${effort} (${unit(loop.unit)})`), scales: { x: { time: false }, y: {} },
         series: [{}, { ...line("measured"), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: trace("measured") } as unknown as uPlot.Series,
           { ...line("model"), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }], paths: trace("model", [7, 4]) } as unknown as uPlot.Series] as uPlot.Series[],
         cursor: { drag: { x: false, y: false }, points: { show: false } },
@@ -214,7 +233,7 @@ export class ErrorLocation {
     fill(this.head, el("strong", {}, "By record"), el("span", { class: "soft clip" }, byNoise ? "error over the noise" : "error"));
     const sorted = [...those].sort((a, b) => of(b) - of(a));
     const worst = Math.max(byNoise ? 1 : 0, ...sorted.map(of));
-    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(worst > 0 ? of(e) / worst : 0, byNoise && of(e) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, byNoise ? times(of(e)) : withUnit(of(e), unitOf(e), 3)))));
+    fill(this.records, sorted.map((e) => el("div", { class: "record" }, el("span", { class: "name" }, e.name), bar(worst > 0 ? of(e) / worst : 0, byNoise && of(e) <= 1.3 ? "fine" : "bad"), el("span", { class: "figure" }, of(e) < 0 ? "–" : byNoise ? times(of(e)) : withUnit(of(e), unitOf(e), 3)))));
   }
 }
 

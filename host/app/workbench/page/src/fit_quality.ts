@@ -1,7 +1,7 @@
 // 1. How good is it? Experiments with their errors against the noise, worst first; one of them over time.
 import type { Experiment, State } from "./api";
 import { bar, el, fill, fillOnce, num, times, unit, withUnit, words } from "./dom";
-import { badness, balanceInView, inNoise, viewChanged, view, worstBalance } from "./store";
+import { badness, inNoise, stepKey, viewChanged, view, worstBalance } from "./store";
 import { TimeView } from "./time_view";
 
 export class FitQuality {
@@ -47,7 +47,6 @@ export class FitQuality {
 
     const shown = sorted.find((e) => e.name === view.experiment);
     const signal = shown?.signals.find((s) => s.signal === view.signal);
-    const b = balanceInView(state);
     const others = sorted.filter((e) => e.name !== view.experiment);
     if (!others.some((e) => e.name === view.overlay)) view.overlay = "";
     const over = others.find((e) => e.name === view.overlay);
@@ -59,11 +58,11 @@ export class FitQuality {
         (signal && signal.rmse !== null ? `; error ${num(signal.rmse, 3)} ${unit(signal.unit)}${signal.noise_floor ? `, noise ${num(signal.noise_floor, 3)}` : ""}` : "")) : null,
       others.length ? this.overlay : null,
       el("ul", { class: "key", "aria-label": "Lines" }, el("li", { class: "measured" }, "measured"), el("li", { class: "model" }, "model"), el("li", { class: "residual" }, "error"),
-        state.at > 0 && !over ? el("li", { class: "before" }, "error before") : null, over ? el("li", { class: "overlay" }, over.name) : null, b?.noise_floor_fit ? el("li", { class: "noise" }, "±2 noise") : null));
+        state.at > 0 && !over ? el("li", { class: "before" }, "error before") : null, over ? el("li", { class: "overlay" }, over.name) : null, signal?.noise_floor ? el("li", { class: "noise" }, "±2 noise") : null));
     if (shown)
       this.time.show({ experiment: shown.name, signal: view.signal, begin: shown.begin_s, end: shown.end_s, before: state.at > 0 && !over ? state.at - 1 : null,
         overlay: over ? { experiment: over.name, begin: over.begin_s, end: over.end_s } : null,
-        stretches: view.brush?.list.find((x) => x.experiment === shown.name)?.stretches ?? [] }, [state.at, state.steps.length, state.steps[state.at]?.what, shown.name, view.signal, over?.name ?? ""].join("|"));
+        stretches: view.brush?.list.find((x) => x.experiment === shown.name)?.stretches ?? [] }, [stepKey(state), shown.name, view.signal, over?.name ?? ""].join("|"));
   }
 
   redraw(): void { this.time.element.dispatchEvent(new Event("colours")); }

@@ -7,7 +7,7 @@ import { FitQuality } from "./fit_quality";
 import { Missing } from "./missing";
 import { redrawAll } from "./plots";
 import { offerPlots } from "./plot_files";
-import { onViewChange, view } from "./store";
+import { onViewChange, stepKey, view } from "./store";
 import "./style.css";
 import { ErrorLocation } from "./error_location";
 
@@ -39,7 +39,7 @@ function run(what: string, more: Record<string, unknown> = {}): void {
 let proposed: Promise<void> = Promise.resolve();
 
 // The search uses all cores, so the first panels are drawn before it begins.
-const good = new FitQuality(), where = new ErrorLocation(() => setTimeout(() => { if (state) searchAutomatically(state); }, 50));
+const good = new FitQuality(), where = new ErrorLocation(() => setTimeout(() => { if (state) searchAutomatically(state); }, 50), complain);
 const missing = new Missing((effect) => run("add", { effect }), () => run("diagnose"));
 const add = new Add(run);
 const beginning = new NewProject(run, () => picker.click());
@@ -76,9 +76,10 @@ function showMessages(title: string, lines: string[]): void {
 
 function problem(p: Problem | null): void {
   note.hidden = !p;
-  if (!p) return fill(note);
+  if (!p) return fillOnce(note, "");
   const place = (f: Problem["findings"][number]) => f.file + (f.line ? `:${f.line}` : "") + (f.column ? `, column ${f.column}` : "");
-  fill(note, el("div", { class: "row" }, el("strong", {}, p.during ? `${words(p.during)}: ${p.what}` : p.what), button("Dismiss", () => { local = null; run("dismiss"); })),
+  // Screen readers say it once, not with each change of the state.
+  fillOnce(note, JSON.stringify(p), el("div", { class: "row" }, el("strong", {}, p.during ? `${words(p.during)}: ${p.what}` : p.what), button("Dismiss", () => { local = null; run("dismiss"); })),
     p.findings.length ? el("ul", {}, p.findings.slice(0, 8).map((f) => el("li", {}, f.file ? el("code", {}, place(f)) : null, f.file ? " " : "", `${f.what}. `, el("em", {}, f.remedy)))) : null);
 }
 
@@ -102,7 +103,7 @@ function render(): void {
 
 // The search for what is missing starts by itself, once for each step.
 function searchAutomatically(s: State): void {
-  const key = `${s.at} ${s.steps.length} ${s.steps[s.at]?.what ?? ""}`;
+  const key = stepKey(s);
   if (!s.steps.length || s.proposal || s.diagnosis || s.work || !where.isShown || wasDiagnosing === key) return;
   wasDiagnosing = key;
   // Something else may have begun meanwhile: then it starts after that.
@@ -118,8 +119,12 @@ async function follow(): Promise<void> {
   for (let seen = 0; ;) {
     try {
       const next = await get<State>("state", { seen });
+      const wasLost = document.body.classList.contains("lost");
       document.body.classList.remove("lost");
-      if (next.changes === seen) continue;
+      if (next.changes === seen) {
+        if (wasLost) render();  // without the message
+        continue;
+      }
       state = next;
       seen = next.changes;
       render();
@@ -165,12 +170,16 @@ function keys(): void {
   addEventListener("keydown", (e) => {
     const typing = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement;
     if ((e.ctrlKey || e.metaKey) && !typing) {
-      if (e.key === "z" && !e.shiftKey) { e.preventDefault(); run("undo"); }
-      if (e.key === "y" || (e.key === "Z" && e.shiftKey)) { e.preventDefault(); run("redo"); }
+      // Columns that are being chosen belong to no step: they would be lost.
+      const steps = panels.hidden ? 0 : state?.steps.length ?? 0, at = state?.at ?? 0;
+      const isUndo = e.key === "z" && !e.shiftKey, isRedo = e.key === "y" || (e.key === "Z" && e.shiftKey);
+      if (isUndo || isRedo) e.preventDefault();
+      if (isUndo && steps && at > 0) run("undo");
+      if (isRedo && at + 1 < steps) run("redo");
       return;
     }
     if (typing || e.altKey) return;
-    if (e.key === "?") help.showModal();
+    if (e.key === "?" && !help.open) help.showModal();
     const panel = panels.children[Number(e.key) - 1];
     if (/^[1-4]$/.test(e.key) && panel) (panel.querySelector<HTMLElement>("[tabindex='0'], button:not(:disabled), [role=tab]") ?? (panel as HTMLElement)).focus();
   });

@@ -3,6 +3,7 @@ import type uPlot from "uplot";
 import type { Candidate, Diagnosis, State } from "./api";
 import { bar, button, el, fill, num, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, kHidden, line, stretchedScale, stretchedSplits } from "./plots";
+import { stepKey } from "./store";
 
 export const label = (c: { effect: string; order: number | null }) => (c.order === null ? c.effect : `${c.effect}:${c.order}`);
 const inWords = (c: { effect: string; order: number | null }) => words(c.effect) + (c.order === null ? "" : `, ${c.order} per turn`);
@@ -15,7 +16,7 @@ function certainty(c: Candidate, found: Diagnosis): string {
   const chosen = found.resampling?.decides ? found.resampling.found.find((f) => f.effects.some((e) => label(e) === label(c))) : undefined;
   if (named && chosen) return `chosen in ${num(100 * (chosen.frequency ?? 0), 2)} of 100 subsamples` + (found.verdict === "confusable_effects" ? "; cannot be distinguished from other effects" : "");
   const open = found.possible?.find((p) => p.effects.some((e) => label(e) === label(c)));
-  if (open) return `cannot tell: ${open.why_not}`;
+  if (open) return `these data do not decide it: ${open.why_not}`;
   if (falls < 0 || score < 0) return "makes left-out data worse";
   if (named) return found.named.length > 1 ? "likely; cannot be distinguished from other effects" : score >= 200 ? "certain" : score >= 20 ? "sure" : "weak";
   if (score < 10) return "could be chance";
@@ -36,7 +37,7 @@ export class Missing {
   constructor(private readonly add: (effect: string) => void, private readonly search: () => void) {}
 
   render(state: State): void {
-    const key = [state.at, state.steps.length, state.steps[state.at]?.what].join("|");
+    const key = stepKey(state);
     if (key !== this.key) { this.key = key; this.chosen = ""; }
     const found = state.diagnosis;
     if (!found) {
@@ -74,10 +75,11 @@ export class Missing {
   }
 
   private row(c: Candidate, found: Diagnosis, state: State): HTMLElement {
+    const choose = () => { this.chosen = name; this.render(state); };
     const name = label(c), chosen = name === this.chosen, named = found.named.some((n) => label(n) === name);
     const falls = c.rmse_cv_before && c.rmse_cv_after !== null ? 1 - c.rmse_cv_after / c.rmse_cv_before : 0;
     return el("div", { role: "option", tabindex: chosen || (!this.chosen && c.rank === 1) ? 0 : -1, "aria-selected": chosen ? "true" : "false", "data-key": `candidate ${name}`, "data-effect": name, class: named ? "named" : "",
-        click: () => { this.chosen = name; this.render(state); } },
+        click: choose, keydown: ((e: KeyboardEvent) => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); choose(); } }) as (event: never) => void },
       el("span", { class: "name" }, inWords(c)), el("span", { class: "figure", title: "decrease of the error on left-out data" }, falls > 0 ? `−${num(100 * falls, 3)} %` : "0 %"), bar(falls, named ? "named" : "bad"),
       el("span", { class: "marks soft" }, certainty(c, found)));
   }
@@ -117,9 +119,9 @@ export class Missing {
 
   private drawUnknown(u: UnknownCurve): void {
     const at = u.points.map((p) => p.at), side = (k: 0 | 1) => u.points.map((p) => (p.visited ? p.interval[k] : null));
-    this.figure.holder.setAttribute("aria-label", `Torque over ${words(u.variable)} that no effect explains`);
+    this.figure.holder.setAttribute("aria-label", `${u.unit === "N" ? "Force" : "Torque"} over ${words(u.variable)} that no effect explains`);
     this.figure.show(() => ({ data: [at, side(1), side(0), u.points.map((p) => p.value)] as uPlot.AlignedData, options: {
-      scales: { x: { time: false } }, axes: axes(`${words(u.variable)} (${unit(u.variable_unit)})`, unit(u.unit)), series: [{}, kHidden, kHidden, line("residual", { width: 2 })],
+      scales: { x: { time: false } }, axes: axes(`${words(u.variable)}${unit(u.variable_unit) ? ` (${unit(u.variable_unit)})` : ""}`, unit(u.unit)), series: [{}, kHidden, kHidden, line("residual", { width: 2 })],
       bands: [{ series: [1, 2], fill: colour("residualband") }], cursor: { drag: { x: false, y: false }, y: false } } }));
   }
 

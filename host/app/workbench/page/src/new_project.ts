@@ -1,6 +1,6 @@
 // Where there is no model yet, and where recordings with names of their own are added: which column is which, with
 // pictures of the signals, and the facts of the drive that the files do not give.
-import type { Proposal, ProposedColumn, State } from "./api";
+import type { PageChoices, Proposal, ProposedColumn, State } from "./api";
 import { button, el, fill, num, unit, words } from "./dom";
 
 type Do = (what: string, more?: Record<string, unknown>) => void;
@@ -13,6 +13,10 @@ const kLabels: Record<string, string> = {
 // Always shown; others where they have a source, or on request.
 const kMain = ["time_s", "current_a", "motor_torque_nm", "motor_position_rad", "motor_velocity_rad_s", "output_position_rad"];
 
+const kFacts: Record<string, string> = { gear_ratio: "Gear ratio", torque_constant_nm_a: "Torque constant", encoder_counts: "Encoder counts", pole_pairs: "Pole pairs" };
+const kWhole = ["encoder_counts", "pole_pairs"];
+function numberOf(text: string | undefined): number { return Number((text ?? "").trim().replace(",", ".") || NaN); }
+
 export class NewProject {
   private readonly body = el("div", { class: "begin" });
   readonly element = el("section", { class: "panel beginning", "aria-labelledby": "q0", hidden: true }, this.body);
@@ -21,6 +25,7 @@ export class NewProject {
   private readonly tolerated = new Set<string>();
   private readonly turned = new Set<string>();
   private showsAll = false;
+  private isShown = false;
   private state: State | null = null;
   private timer = 0;
 
@@ -36,12 +41,24 @@ export class NewProject {
       return false;
     }
     const p = state.proposal;
+    if (p && !this.isShown) this.take(p.choices?.page);
+    this.isShown = !!p;
     const typing = document.activeElement instanceof HTMLInputElement && this.body.contains(document.activeElement) ? document.activeElement : null;
     const at = typing?.type === "text" ? typing.selectionStart : null;
     fill(this.body, p ? this.proposal(state, p) : this.invitation(state));
     if (at !== null && document.activeElement instanceof HTMLInputElement) document.activeElement.setSelectionRange(at, at);
     this.element.dataset.can = p ? (p.can_begin ? "yes" : "no") : "";
     return true;
+  }
+
+  // What the page had sent before it was loaded again.
+  private take(page: PageChoices | undefined): void {
+    if (!page || this.chosen.size || Object.keys(this.facts).length || this.turned.size || this.tolerated.size) return;
+    for (const [column, chosen] of page.chosen) this.chosen.set(column, chosen);
+    for (const kind of page.tolerated) this.tolerated.add(kind);
+    for (const column of page.turned) this.turned.add(column);
+    Object.assign(this.facts, page.facts);
+    this.left = page.left;
   }
 
   private forget(): void {
@@ -87,7 +104,7 @@ export class NewProject {
       p.findings.length ? el("ul", { class: "findings" }, p.findings.slice(0, 6).map((f) => el("li", {}, `${f.column && f.column !== "time_s" ? `${f.column}: ` : ""}${f.what}${f.line ? ` (${f.file}, line ${f.line})` : ""}`))) : null,
       [...tolerable, ...others].length ? el("p", { class: "row actions" }, [...tolerable, ...others].map((kind) => el("label", {},
         el("input", { type: "checkbox", checked: this.tolerated.has(kind), "data-key": `tolerate ${kind}`, change: ((e: Event) => { if ((e.target as HTMLInputElement).checked) this.tolerated.add(kind); else this.tolerated.delete(kind); this.ask(); }) as (event: never) => void }), ` use them all the same: ${words(kind)}`))) : null,
-      el("div", { class: "row actions" }, button(p.adds ? "Add these recordings" : "Identify a first model", () => { this.dropTimer(); this.run("begin", { choices: this.choices() }); }, { class: "main", "data-begin": "", disabled: off || !p.can_begin }),
+      el("div", { class: "row actions" }, button(p.adds ? "Add these recordings" : "Identify a first model", () => this.send("begin"), { class: "main", "data-begin": "", disabled: off || !p.can_begin }),
         button(p.adds ? "Leave them out" : "Other recordings", () => { this.dropTimer(); this.forget(); this.run("forget"); }, { class: "quiet", disabled: off, "data-forget": "" })));
   }
 
@@ -107,11 +124,12 @@ export class NewProject {
     const side = String(this.facts["position_side"] ?? p.position_side ?? "");
     return el("div", { class: "facts" },
       p.axis === "linear" ? null : field("gear_ratio", "Gear ratio", "motor turns for one turn of the output", p.gear_ratio),
-      field("torque_constant_nm_a", "Torque constant, N·m/A", "torque of the motor for one ampere; without it torques come out in amperes", p.torque_constant_nm_a),
+      p.axis === "linear" ? field("torque_constant_nm_a", "Force constant, N/A", "force of the motor for one ampere; without it forces come out in amperes", p.torque_constant_nm_a)
+        : field("torque_constant_nm_a", "Torque constant, N·m/A", "torque of the motor for one ampere; without it torques come out in amperes", p.torque_constant_nm_a),
       side || p.question ? choice("position_side", "Position and velocity are of the", [["", "? (choose one)"], ["motor", "motor"], ["link", "link (output)"]].filter(([v]) => v || !side || side === "open") as [string, string][], side === "open" ? "" : side) : null,
       p.joints.length > 1 ? choice("joint", "Joint", p.joints.map((j) => [String(j), String(j)]), String(this.facts["joint"] ?? p.joint ?? "")) : null,
       p.needs_pole_pairs ? field("pole_pairs", "Pole pairs of the motor", `${p.needs_pole_pairs} counts electrical turns`, null) : null,
-      this.hasCounts(p) ? field("encoder_counts", "Encoder counts a motor turn", "to turn counts into angles", p.encoder_counts) : null);
+      this.hasCounts(p) ? field("encoder_counts", p.axis === "linear" ? "Encoder counts a metre" : "Encoder counts a motor turn", p.axis === "linear" ? "to turn counts into metres" : "to turn counts into angles", p.encoder_counts) : null);
   }
 
   private hasCounts(p: Proposal): boolean {
@@ -129,7 +147,8 @@ export class NewProject {
     const at = (v: number | null | undefined) => (v === null || v === undefined || !factor || factor.factor === null ? null : (v * factor.factor + factor.offset) * scale);
     const [low, high] = [at(signal?.least), at(signal?.largest)];
     const range = low === null || high === null ? "" : `${num(Math.min(low, high), 3)} … ${num(Math.max(low, high), 3)} ${unit(si)}`;
-    const label = kLabels[c.column] ?? words(c.column.replace(/_(rad_s|rad|a|nm|c|s)$/, ""));
+    const rotary = kLabels[c.column] ?? words(c.column.replace(/_(rad_s|rad|a|nm|c|s)$/, ""));
+    const label = p.axis === "linear" ? rotary.replace("torque", "force") : rotary;
     return el("tr", { "data-column": c.column, class: source === null ? "absent" : "" }, el("th", { scope: "row", title: c.column }, label),
       el("td", {}, fixed ? el("code", {}, String(source ?? "")) : el("select", { "aria-label": `Column of ${label}`, "data-key": `source ${c.column}`,
         change: ((e: Event) => this.choose(c, (e.target as HTMLSelectElement).value || null, "")) as (event: never) => void },
@@ -165,11 +184,12 @@ export class NewProject {
     }
     for (const name of this.left) if (!without.includes(name) && ![...this.chosen.values()].some((c) => c.source === name)) without.push(name);
     this.left = without;
-    const number = (key: string) => { const v = Number((this.facts[key] ?? "").trim().replace(",", ".") || NaN); return Number.isFinite(v) ? v : undefined; };
+    const number = (key: string) => { const v = numberOf(this.facts[key]); return Number.isFinite(v) ? v : undefined; };
+    const page: PageChoices = { chosen: [...this.chosen], facts: { ...this.facts }, tolerated: [...this.tolerated], turned: [...this.turned], left: this.left };
     // What was mapped by hand is of the same side as what was guessed.
     const side = this.facts["position_side"] ?? (map.length && p?.position_side === "link" ? "link" : undefined);
     return { map, without, turned: [...this.turned].filter((column) => p?.columns.some((c) => c.column === column && c.source !== null)), gear_ratio: number("gear_ratio"), torque_constant_nm_a: number("torque_constant_nm_a"), encoder_counts: number("encoder_counts"), joint: number("joint"), pole_pairs: number("pole_pairs"),
-      position_side: side && side !== "open" ? side : undefined, tolerate: [...this.tolerated] };
+      position_side: side && side !== "open" ? side : undefined, tolerate: [...this.tolerated], page };
   }
   private left: string[] = [];
 
@@ -179,9 +199,17 @@ export class NewProject {
     this.timer = 0;
   }
 
-  private ask(): void {
+  private ask(): void { this.send("propose"); }
+
+  // A fact that is no number is not left out silently.
+  private send(what: "propose" | "begin"): void {
     this.dropTimer();
-    this.run("propose", { choices: this.choices() });
+    const wrong = Object.keys(kFacts).find((key) => {
+      const value = numberOf(this.facts[key]);
+      return (this.facts[key] ?? "").trim() && !(value > 0 && Number.isFinite(value) && (!kWhole.includes(key) || Number.isInteger(value)));
+    });
+    if (wrong) this.run("complain", { what: `${kFacts[wrong]}: “${this.facts[wrong]}” is not a ${kWhole.includes(wrong) ? "whole number" : "number"} above zero.` });
+    else this.run(what, { choices: this.choices() });
   }
 }
 

@@ -1,6 +1,6 @@
 // A plot as it is drawn now, as a file: picture, vectors or numbers.
 import type uPlot from "uplot";
-import { button, el } from "./dom";
+import { button, el, saveAs } from "./dom";
 import { colour, drawnFigures, type Figure } from "./plots";
 
 type Numbers = ArrayLike<number | null | undefined>;
@@ -30,7 +30,7 @@ function label(u: uPlot, axis: number): string {
 export function csvOf(u: uPlot): string {
   const all = curves(u).filter((c) => c.stroke !== "transparent");
   const quoted = (text: string) => `"${text.replace(/"/g, '""')}"`;
-  const x = label(u, 0) || "x", y = label(u, 1);
+  const x = label(u, 0) || String(u.series[0]?.label ?? "x"), y = label(u, 1);
   const value = (v: number | null | undefined) => (v === null || v === undefined || !Number.isFinite(v) ? "" : String(v));
   if (!hasOwnTimes(u)) {
     const rows = [[x, ...all.map((c) => (y ? `${c.name}, ${y}` : c.name))].map(quoted).join(",")];
@@ -92,11 +92,8 @@ async function save(figure: Figure, ending: "png" | "svg" | "csv"): Promise<void
   if (!u) return;
   const blob = ending === "png" ? await pngOf(u) : new Blob([ending === "svg" ? svgOf(u) : csvOf(u)], { type: ending === "svg" ? "image/svg+xml" : "text/csv" });
   if (!blob) return;
-  const address = URL.createObjectURL(blob);
   const name = (figure.holder.getAttribute("aria-label") ?? "plot").toLowerCase().replace(/[^a-z0-9.]+/g, "-").replace(/^-|-$/g, "").slice(0, 80);
-  const link = el("a", { href: address, download: `${name}.${ending}` });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  saveAs(blob, `${name}.${ending}`);
 }
 
 // All plots that are to be seen, each with the files that it may become.

@@ -10,6 +10,11 @@ export const view = {
   brush: null as Brush | null,
 };
 
+// The present step and the one before it: what is drawn for them need not be fetched again.
+export function stepKey(state: State): string {
+  return [state.at, state.steps[state.at]?.id, state.steps[state.at - 1]?.id].join("|");
+}
+
 type Listener = () => void;
 const listeners = new Set<Listener>();
 export function onViewChange(listener: Listener): void { listeners.add(listener); }

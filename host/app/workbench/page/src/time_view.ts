@@ -122,7 +122,7 @@ export class TimeView {
     const options = (x: string, y: string, series: uPlot.Series[], under: (u: uPlot) => void): Partial<uPlot.Options> => ({
       scales: { x: { time: false, range: () => [this.from, this.to] } },
       axes: axes(x, y),
-      series: [{}, ...series],
+      series: [{ label: "time (s)" }, ...series],
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
       hooks: {
         drawClear: [(u) => { for (const [from, to] of shown.stretches) shade(u, colour("brush"), from, to, "x"); under(u); }],
