@@ -27,9 +27,9 @@ std::vector<data::Experiment> with_earlier_effort(const Identification& found, d
     data::Experiment& e = experiments.emplace_back(*record.experiment);
     const Column column = e.has(Column::current) ? Column::current : Column::motor_torque;
     if (!e.has(column)) continue;
-    std::vector<double>& effort = e[column];
+    const std::span<double> effort(e[column]);
     for (const data::Segment& s : record.segments) {
-      const std::span<double> part(effort.data() + s.first, s.last - s.first);
+      const std::span<double> part = effort.subspan(s.first, s.last - s.first);
       std::ranges::copy(signals::fractional_delay(part, -by_s / record.sample_s), part.begin());
     }
   }
