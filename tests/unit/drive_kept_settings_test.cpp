@@ -41,6 +41,11 @@ TEST(KeptSettings, AStiffnessOfTheModelFollowsTheNewModelAndOneThatWasStatedStay
   EXPECT_NEAR(value(packed(stiffer(), kept_settings(stated, 10.0).text), "feedforward_stiffness"), 9000.0, 1.0);
 }
 
+TEST(KeptSettings, ALoopWithoutAnIntegratorStaysWithoutOne) {
+  const Unpacked before = packed(tests::two_ampere_drive(), with("[velocity_loop]\nintegral_nm_rad = 0\n"));
+  EXPECT_EQ(value(packed(stiffer(), kept_settings(before, 10.0).text), "integral_gain"), 0.0);
+}
+
 TEST(KeptSettings, NoiseAndExcitationThatABlockDoesNotShowAreNamed) {
   EXPECT_TRUE(
       kept_settings(packed(tests::two_ampere_drive(), with("[load]\ninertia_kg_m2 = 0.08\n")), 10.0).warnings.empty());

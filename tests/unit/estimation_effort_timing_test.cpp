@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "host/engine/estimation/standard_intervals.hpp"
+#include "tests/unit/estimation_intervals_that_hold.hpp"
 
 namespace flexspline::estimation::estimation_effort_timing_test {
 namespace {
@@ -68,22 +68,15 @@ TEST(EffortLag, FindsTheLagAndTheInertiaThatItTakes) {
 }
 
 TEST(EffortLag, LetsTheIntervalOfTheInertiaHoldItsTruthAndSaysSo) {
-  int without = 0, with = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const data::Dataset dataset = late_torque(0.002, seed);
-    const auto found = identify(dataset, rigid_drive(), kOptions);
-    const auto holds = [&] {
-      return *found->estimates.front().low <= kInertia && kInertia <= *found->estimates.front().high;
-    };
-    without += holds();
-    count_biases(*found, dataset, rigid_drive(), kOptions);
-    with += holds();
-    ASSERT_FALSE(found->warnings.empty());
-    EXPECT_NE(found->warnings.back().find(" ms later than the motion"), std::string::npos) << found->warnings.back();
-    EXPECT_EQ(found->warnings.back().find("current_hold"), std::string::npos) << found->warnings.back();
-  }
-  EXPECT_EQ(without, 0);
-  EXPECT_GE(with, 9);
+  const auto says_so = [](const Identification& found) {
+    ASSERT_FALSE(found.warnings.empty());
+    EXPECT_NE(found.warnings.back().find(" ms later than the motion"), std::string::npos) << found.warnings.back();
+    EXPECT_EQ(found.warnings.back().find("current_hold"), std::string::npos) << found.warnings.back();
+  };
+  const IntervalsThatHold held = intervals_that_hold([](std::uint64_t seed) { return late_torque(0.002, seed); },
+                                                     rigid_drive(), kOptions, kInertia, says_so);
+  EXPECT_EQ(held.before, 0);
+  EXPECT_GE(held.after, 9);
 }
 
 TEST(EffortLag, OfHalfASampleIsSaidToBeThatOfAMeasuredEffortThatIsTakenForHeld) {

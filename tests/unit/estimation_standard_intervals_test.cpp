@@ -9,6 +9,7 @@
 
 #include "host/common/signals/butterworth.hpp"
 #include "host/engine/estimation/regressor_noise.hpp"
+#include "tests/unit/estimation_intervals_that_hold.hpp"
 
 namespace flexspline::estimation::estimation_standard_intervals_test {
 namespace {
@@ -98,20 +99,10 @@ TEST(RegressorNoise, FindsTheAttenuationOfAStiffnessByNoiseOfThePosition) {
 }
 
 TEST(RegressorNoise, LetsTheIntervalOfTheAttenuatedStiffnessHoldItsTruth) {
-  int without = 0, with = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const data::Dataset dataset = noisy_spring(4e-4, seed);
-    const PipelineOptions options{kCutoff, false};
-    const auto found = identify(dataset, spring(), options);
-    const auto holds = [&] {
-      return *found->estimates.front().low <= kStiffness && kStiffness <= *found->estimates.front().high;
-    };
-    without += holds();
-    count_biases(*found, dataset, spring(), options);
-    with += holds();
-  }
-  EXPECT_EQ(without, 0);
-  EXPECT_GE(with, 9);
+  const IntervalsThatHold held = intervals_that_hold([](std::uint64_t seed) { return noisy_spring(4e-4, seed); },
+                                                     spring(), {kCutoff, false}, kStiffness, [](const auto&) {});
+  EXPECT_EQ(held.before, 0);
+  EXPECT_GE(held.after, 9);
 }
 
 TEST(RegressorNoise, IsNothingWhereThePositionIsExact) {

@@ -69,7 +69,7 @@ class WorkbenchApi : public ::testing::Test {
     return ask("POST", "/api/do", {{"tab", tab}}, what, status);
   }
   // The state once no work runs any more.
-  json settled(const std::string& tab) {
+  json state_after_work(const std::string& tab) {
     for (std::uint64_t seen = 0;;) {
       json state = ask("GET", "/api/state", {{"tab", tab}, {"seen", std::to_string(seen)}});
       if (state.contains("work") && state["work"].is_null()) return state;
@@ -83,7 +83,7 @@ class WorkbenchApi : public ::testing::Test {
 };
 
 TEST_F(WorkbenchApi, SaysHowGoodTheModelIsByExperiment) {
-  const json state = settled(new_tab());
+  const json state = state_after_work(new_tab());
   ASSERT_EQ(state["experiments"].size(), 2u);
   EXPECT_EQ(state["experiments"][1]["role"], "holdout");
   EXPECT_EQ(state["steps"].size(), 1u);
@@ -103,15 +103,15 @@ TEST_F(WorkbenchApi, ShowsAnExperimentWhoseNameIsNoUtf8) {
   setup.first = open(dataset, file, {}, [](std::string_view) {});
   setup.folder = folder_;
   api_ = std::make_unique<Api>(std::move(setup));
-  EXPECT_EQ(settled(new_tab())["experiments"][0]["name"], "fr\xEF\xBF\xBDsen");
+  EXPECT_EQ(state_after_work(new_tab())["experiments"][0]["name"], "fr\xEF\xBF\xBDsen");
 }
 
 // A page that hears of a work only when it is over still learns that there was one.
 TEST_F(WorkbenchApi, CountsTheWorksThatWereStarted) {
   const std::string tab = new_tab();
-  const auto before = settled(tab)["works_started"].get<int>();
+  const auto before = state_after_work(tab)["works_started"].get<int>();
   act(tab, {{"do", "refit"}});
-  EXPECT_EQ(settled(tab)["works_started"].get<int>(), before + 1);
+  EXPECT_EQ(state_after_work(tab)["works_started"].get<int>(), before + 1);
 }
 
 TEST_F(WorkbenchApi, GivesCurvesAndWhereTheRowsOfARegionLieInTime) {
@@ -173,27 +173,27 @@ TEST_F(WorkbenchApi, AnswersWhatCannotBeWithWordsNotWithAnEnd) {
 TEST_F(WorkbenchApi, RemovesAnEffectTakesThatBackAndLeavesTheOtherTabAlone) {
   const std::string tab = new_tab(), other = new_tab();
   act(tab, {{"do", "remove"}, {"effect", "coulomb_friction"}});
-  json state = settled(tab);
+  json state = state_after_work(tab);
   ASSERT_FALSE(state.contains("problem")) << state["problem"];
   ASSERT_EQ(state["steps"].size(), 2u);
   EXPECT_EQ(state["at"], 1);
   const auto fit = [](const json& step) { return step["balances"][0]["fit"].get<double>(); };
   EXPECT_GT(fit(state["steps"][1]), 3.0 * fit(state["steps"][0]));
   act(tab, {{"do", "undo"}});
-  EXPECT_EQ(settled(tab)["at"], 0);
+  EXPECT_EQ(state_after_work(tab)["at"], 0);
   act(tab, {{"do", "redo"}});
-  EXPECT_EQ(settled(tab)["at"], 1);
+  EXPECT_EQ(state_after_work(tab)["at"], 1);
   act(tab, {{"do", "go"}, {"step", 5}}, 400);
-  EXPECT_EQ(settled(other)["steps"].size(), 1u);
+  EXPECT_EQ(state_after_work(other)["steps"].size(), 1u);
   // A tab that was duplicated begins where the first one stands.
   const std::string copy = ask("POST", "/api/tab", {{"like", tab}})["tab"].get<std::string>();
-  EXPECT_EQ(settled(copy)["steps"].size(), 2u);
+  EXPECT_EQ(state_after_work(copy)["steps"].size(), 2u);
 }
 
 TEST_F(WorkbenchApi, SaysWhyAnEffectCannotBeAdded) {
   const std::string tab = new_tab();
   act(tab, {{"do", "add"}, {"effect", "no_such_effect"}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   ASSERT_TRUE(state.contains("problem"));
   EXPECT_NE(state["problem"]["what"].get<std::string>().find("no_such_effect"), std::string::npos);
   EXPECT_EQ(state["steps"].size(), 1u);
@@ -202,18 +202,18 @@ TEST_F(WorkbenchApi, SaysWhyAnEffectCannotBeAdded) {
 TEST_F(WorkbenchApi, SavesIntoItsFolderAloneAndReplacesOnlyWhenTold) {
   const std::string tab = new_tab();
   act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}});
-  EXPECT_EQ(settled(tab)["saved"]["file"], (folder_ / "mine.toml").string());
+  EXPECT_EQ(state_after_work(tab)["saved"]["file"], (folder_ / "mine.toml").string());
   const auto& known = catalogue::known_effects();
   EXPECT_EQ(model::read(folder_ / "mine.toml", known).model.effects.size(), first()->model.effects.size());
   act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}}, 400);
   act(tab, {{"do", "save"}, {"what", "model"}, {"name", "mine.toml"}, {"replace", true}});
-  settled(tab);
+  state_after_work(tab);
   for (const char* name : {"../x.toml", "/tmp/x.toml", "x.sh", ".x.toml", "a/b.toml"})
     act(tab, {{"do", "save"}, {"what", "model"}, {"name", name}}, 400);
   act(tab, {{"do", "save"}, {"what", "passwd"}, {"name", "x.toml"}}, 400);
   // Another model is not the one that was saved.
   act(tab, {{"do", "refit"}});
-  EXPECT_FALSE(settled(tab).contains("saved"));
+  EXPECT_FALSE(state_after_work(tab).contains("saved"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
 }
 
@@ -223,7 +223,7 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
     return api_->answer({"POST", "/api/drop", {{"tab", tab}}, "", {{name, content}}}).status;
   };
   ASSERT_EQ(drop("bad.csv", "time_s,current_a,motor_position_rad\n0,1,2\n0.001,oops,2\n"), 200);
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   ASSERT_TRUE(state.contains("problem"));
   const json& finding = state["problem"]["findings"].at(0);
   EXPECT_EQ(finding["file"], "bad.csv");
@@ -234,7 +234,7 @@ TEST_F(WorkbenchApi, SaysWhatIsWrongWithADroppedFile) {
   // The search that begins by itself does not take the message away.
   act(tab, {{"do", "diagnose"}});
   act(tab, {{"do", "cancel"}});
-  EXPECT_TRUE(settled(tab).contains("problem"));
+  EXPECT_TRUE(state_after_work(tab).contains("problem"));
   EXPECT_EQ(drop("dataset.toml", "format = \"flexspline-dataset/1\"\n"), 400);
   EXPECT_EQ(drop("../evil.csv", "time_s\n"), 400);
   EXPECT_EQ(drop("run.sh", "#!/bin/sh\n"), 400);
@@ -280,9 +280,9 @@ TEST_F(WorkbenchApi, RunsTheClosedLoopWithoutCompensationWithTheModelAsOpenedAnd
   const std::string tab = new_tab();
   ask("GET", "/api/closed_loop", {{"tab", tab}}, nullptr, 404);
   act(tab, {{"do", "remove"}, {"effect", "viscous_friction"}});
-  settled(tab);
+  state_after_work(tab);
   act(tab, {{"do", "try"}, {"scenario", "sine"}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   ASSERT_FALSE(state.contains("problem")) << state["problem"];
   const json& found = state["closed_loop"];
   ASSERT_EQ(found["runs"].size(), 3u);
@@ -324,11 +324,11 @@ TEST_F(WorkbenchApi, AClosedLoopThatIsCancelledMidwayLeavesNothingBehind) {
   began.get_future().wait();
   act(tab, {{"do", "undo"}}, 409);
   act(tab, {{"do", "cancel"}});
-  EXPECT_TRUE(settled(tab)["work"].is_null());
+  EXPECT_TRUE(state_after_work(tab)["work"].is_null());
   go.set_value();
   // Work after it is not disturbed by what comes of it late.
   act(tab, {{"do", "refit"}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   EXPECT_EQ(state["at"], 1);
   EXPECT_FALSE(state.contains("closed_loop"));
   EXPECT_FALSE(state.contains("problem"));
@@ -337,14 +337,14 @@ TEST_F(WorkbenchApi, AClosedLoopThatIsCancelledMidwayLeavesNothingBehind) {
 TEST_F(WorkbenchApi, ADriveThatIsNotInReachIsNotOpened) {
   const std::string tab = new_tab();
   act(tab, {{"do", "connect"}, {"drive", "tcp:192.0.2.1:4711"}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   ASSERT_TRUE(state.contains("problem"));
   EXPECT_EQ(ask("GET", "/api/drive")["status"]["connected"], false);
   act(tab, {{"do", "preview-flash"}});
-  EXPECT_TRUE(settled(tab).contains("problem"));
+  EXPECT_TRUE(state_after_work(tab).contains("problem"));
   act(tab, {{"do", "flash"}}, 400);  // nothing was shown
   act(tab, {{"do", "flash"}, {"before", "a"}, {"after", "b"}});
-  EXPECT_TRUE(settled(tab).contains("problem"));
+  EXPECT_TRUE(state_after_work(tab).contains("problem"));
 }
 
 TEST(WorkbenchSession, WorkThatIsCancelledChangesNothingAndIsNotInTheWay) {
@@ -430,7 +430,7 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
   api_ = std::make_unique<Api>(setup);
   const std::string tab = new_tab(), other = new_tab();
   act(tab, {{"do", "remove"}, {"effect", "viscous_friction"}});
-  const json before = settled(tab);
+  const json before = state_after_work(tab);
   act(tab, {{"do", "undo"}});
   act(tab, {{"do", "redo"}});
   api_.reset();
@@ -448,7 +448,7 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
                              {other, "Showing /api/maps", "", false}},
                             true});
   api_ = std::make_unique<Api>(setup);
-  const json after = settled(tab);
+  const json after = state_after_work(tab);
   ASSERT_EQ(after["steps"].size(), 2U);
   EXPECT_EQ(after["at"], 1);
   EXPECT_EQ(after["steps"][1]["what"], "viscous_friction");
@@ -459,12 +459,13 @@ TEST_F(WorkbenchApi, TheNextProcessHasTheTabsOfTheOneThatEndedAndSaysWhatEndedIt
   EXPECT_GT(after["changes"].get<std::uint64_t>(), before["changes"].get<std::uint64_t>());
   EXPECT_EQ(after["problem"]["during"], "Searching for what is missing");
   EXPECT_EQ(after["problem"]["what"].get<std::string>().find("it crashed"), 0U);
-  EXPECT_NE(settled(other)["problem"]["what"].get<std::string>().find("Searching for what is missing, which failed"),
-            std::string::npos);
+  EXPECT_NE(
+      state_after_work(other)["problem"]["what"].get<std::string>().find("Searching for what is missing, which failed"),
+      std::string::npos);
   // What the page begins by itself is not begun again; all else may be tried.
   act(tab, {{"do", "diagnose"}}, 500);
   act(tab, {{"do", "refit"}});
-  EXPECT_EQ(settled(tab)["steps"].size(), 3U);
+  EXPECT_EQ(state_after_work(tab)["steps"].size(), 3U);
 }
 
 TEST_F(WorkbenchApi, ARefitThatIsCancelledEndsWithinTheFit) {

@@ -68,7 +68,7 @@ class WorkbenchBegin : public ::testing::Test {
   int drop(const std::string& tab, const std::string& name, const std::string& content) {
     return api_->answer({"POST", "/api/drop", {{"tab", tab}}, "", {{name, content}}}).status;
   }
-  json settled(const std::string& tab) {
+  json state_after_work(const std::string& tab) {
     for (std::uint64_t seen = 0;;) {
       json state = ask("GET", "/api/state", {{"tab", tab}, {"seen", std::to_string(seen)}});
       if (state.contains("work") && state["work"].is_null()) return state;
@@ -97,7 +97,7 @@ class WorkbenchBegin : public ::testing::Test {
 
 TEST_F(WorkbenchBegin, WithoutAModelThereIsNothingToDoButToBegin) {
   const std::string tab = new_tab();
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   EXPECT_TRUE(state["steps"].empty());
   for (const char* what : {"undo", "diagnose", "refit", "pack", "flash", "preview-flash"})
     act(tab, {{"do", what}}, 400);
@@ -111,18 +111,18 @@ TEST_F(WorkbenchBegin, WithoutAModelThereIsNothingToDoButToBegin) {
 TEST_F(WorkbenchBegin, ARecordingIsDroppedColumnsAreChosenAndAModelIsThere) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  EXPECT_FALSE(settled(tab)["proposal"]["can_begin"].get<bool>());
+  EXPECT_FALSE(state_after_work(tab)["proposal"]["can_begin"].get<bool>());
   const json choices = {
       {"map", {"current_a=i"}}, {"gear_ratio", 100}, {"tolerate", {"jitter"}}, {"joint", 2}, {"position_side", "link"}};
   act(tab, {{"do", "propose"}, {"choices", choices}});
-  EXPECT_TRUE(settled(tab)["proposal"]["can_begin"].get<bool>());
+  EXPECT_TRUE(state_after_work(tab)["proposal"]["can_begin"].get<bool>());
   EXPECT_EQ(choices_.map, std::vector<std::string>{"current_a=i"});
   EXPECT_EQ(choices_.gear_ratio, 100.0);
   EXPECT_EQ(choices_.joint, 2);
   EXPECT_EQ(choices_.position_side, "link");
   ASSERT_EQ(files_.size(), 1u);
   act(tab, {{"do", "begin"}, {"choices", choices}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   ASSERT_EQ(state["steps"].size(), 1u) << state.dump();
   EXPECT_FALSE(state.contains("proposal"));
   EXPECT_EQ(state["data_name"], "log.csv");
@@ -131,7 +131,7 @@ TEST_F(WorkbenchBegin, ARecordingIsDroppedColumnsAreChosenAndAModelIsThere) {
   // Another process goes on with it.
   api_.reset();
   start({{"it crashed", {{tab, "Identifying", "", true}}, true}});
-  const json again = settled(tab);
+  const json again = state_after_work(tab);
   ASSERT_EQ(again["steps"].size(), 1u) << again.dump();
   EXPECT_EQ(again["data_name"], "log.csv");
   EXPECT_TRUE(again.contains("problem"));
@@ -140,48 +140,48 @@ TEST_F(WorkbenchBegin, ARecordingIsDroppedColumnsAreChosenAndAModelIsThere) {
 TEST_F(WorkbenchBegin, ForeignRecordingsInATabWithAModelAreAskedForAndAdded) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  settled(tab);
+  state_after_work(tab);
   act(tab, {{"do", "begin"}});
-  const std::size_t before = settled(tab)["experiments"].size();
+  const std::size_t before = state_after_work(tab)["experiments"].size();
   ASSERT_EQ(drop(tab, "more.csv", log()), 200);
-  const json asked = settled(tab);
+  const json asked = state_after_work(tab);
   EXPECT_TRUE(asked["proposal"]["adds"].get<bool>()) << asked.dump();
   EXPECT_EQ(choices_.torque_constant_nm_a, 0.1) << "the drive is known by now";
   // Also where the user has chosen a column: only what is stated takes the place of the drive's facts.
   act(tab, {{"do", "propose"}, {"choices", {{"map", {"current_a=i"}}, {"torque_constant_nm_a", 0.2}}}});
-  settled(tab);
+  state_after_work(tab);
   EXPECT_EQ(choices_.gear_ratio, 100.0);
   EXPECT_EQ(choices_.torque_constant_nm_a, 0.2);
   act(tab, {{"do", "begin"}});
-  const json state = settled(tab);
+  const json state = state_after_work(tab);
   EXPECT_EQ(choices_.gear_ratio, 100.0);
   EXPECT_EQ(state["steps"].size(), 2u) << state.dump();
   EXPECT_EQ(state["experiments"].size(), before + 1);
   // Those that are left out are forgotten.
   ASSERT_EQ(drop(tab, "third.csv", log()), 200);
-  EXPECT_TRUE(settled(tab).contains("proposal"));
+  EXPECT_TRUE(state_after_work(tab).contains("proposal"));
   // One that comes while columns are chosen joins those that wait for them; one that cannot be read does not.
   ASSERT_EQ(drop(tab, "fourth.csv", log()), 200);
-  EXPECT_TRUE(settled(tab).contains("proposal"));
+  EXPECT_TRUE(state_after_work(tab).contains("proposal"));
   EXPECT_EQ(files_.size(), 2u);
   ASSERT_EQ(drop(tab, "broken.csv", "?"), 200);
-  EXPECT_TRUE(settled(tab).contains("problem"));
+  EXPECT_TRUE(state_after_work(tab).contains("problem"));
   act(tab, {{"do", "propose"}});
-  settled(tab);
+  state_after_work(tab);
   EXPECT_EQ(files_.size(), 2u);
   act(tab, {{"do", "forget"}});
-  EXPECT_FALSE(settled(tab).contains("proposal"));
+  EXPECT_FALSE(state_after_work(tab).contains("proposal"));
   act(tab, {{"do", "begin"}}, 400);
 }
 
 TEST_F(WorkbenchBegin, AFileThatCannotBeReadIsNotInTheWayOfTheNext) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  settled(tab);
+  state_after_work(tab);
   ASSERT_EQ(drop(tab, "broken.csv", "?"), 200);
-  EXPECT_EQ(settled(tab)["problem"]["what"], "it is broken");
+  EXPECT_EQ(state_after_work(tab)["problem"]["what"], "it is broken");
   act(tab, {{"do", "propose"}});
-  settled(tab);
+  state_after_work(tab);
   EXPECT_EQ(files_.size(), 1u);
   EXPECT_EQ(drop(tab, "run.sh", "#!"), 400);
   EXPECT_EQ(drop(tab, "dataset.toml", ""), 400);
@@ -190,16 +190,16 @@ TEST_F(WorkbenchBegin, AFileThatCannotBeReadIsNotInTheWayOfTheNext) {
 TEST_F(WorkbenchBegin, ASecondFileOfTheSameNameDoesNotReplaceTheFirst) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  settled(tab);
+  state_after_work(tab);
   ASSERT_EQ(drop(tab, "log.csv", "t,i,q\n0,1,2\n"), 200);
-  settled(tab);
+  state_after_work(tab);
   ASSERT_EQ(files_.size(), 2u);
   EXPECT_EQ(files_[0].filename(), "log-2.csv");
   EXPECT_EQ(files_[1].filename(), "log.csv");
   EXPECT_EQ(fs::file_size(files_[1]), log().size());
   const Answer both = api_->answer({"POST", "/api/drop", {{"tab", tab}}, "", {{"a.csv.gz", "1"}, {"a.csv.gz", "2"}}});
   ASSERT_EQ(both.status, 200) << both.body;
-  settled(tab);
+  state_after_work(tab);
   ASSERT_EQ(files_.size(), 4u);
   EXPECT_EQ(files_[0].filename(), "a-2.csv.gz");
 }
@@ -207,16 +207,16 @@ TEST_F(WorkbenchBegin, ASecondFileOfTheSameNameDoesNotReplaceTheFirst) {
 TEST_F(WorkbenchBegin, AProposalHoldsTheChoicesForAPageThatIsLoadedAgain) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  settled(tab);
+  state_after_work(tab);
   const json choices = {{"map", {"current_a=i"}}, {"page", {{"facts", {{"gear_ratio", "100"}}}}}};
   act(tab, {{"do", "propose"}, {"choices", choices}});
-  EXPECT_EQ(settled(tab)["proposal"]["choices"], choices);
+  EXPECT_EQ(state_after_work(tab)["proposal"]["choices"], choices);
 }
 
 TEST_F(WorkbenchBegin, ChoicesOfTheWrongKindAreRefused) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);
-  settled(tab);
+  state_after_work(tab);
   const json wrong[] = {{{"gear_ratio", -1}},  {{"gear_ratio", "x"}}, {{"joint", 1.5}},    {{"map", "a=b"}},
                         {{"map", {1}}},        {{"axis", "round"}},   {{"pole_pairs", 0}}, {{"tolerate", {{"a", 1}}}},
                         {{"position_side", 3}}};

@@ -188,7 +188,8 @@ RecordedRuns record_runs(drive::Recorder& recorder, const planning::Plan& plan, 
     try {
       // Until an index pulse comes, or somebody homes it, a drive with an encoder that only counts knows neither.
       const protocol::Reference known = recorder.reference();
-      measures.knows_turn = known.knows_turn, measures.knows_output = known.knows_output;
+      measures.knows_turn = known.knows_turn;
+      measures.knows_output = known.knows_output;
       drive::Recording r =
           recorder.record(run, {Interruptible::interrupted, [&](double time_s) {
                                   console.progress(fmt::format("run {} of {}, {}: {:.1f} of {:g} s", i + 1,

@@ -62,7 +62,7 @@ constexpr Place kPlaces[] = {
     {"output_filter_corner", "output_encoder", "corner_hz"},
     {"position_gain", "position_loop", "bandwidth_hz", kPerTurn},
     {"velocity_gain", "velocity_loop", "gain_nm_s_rad"},
-    {"integral_gain", "velocity_loop", "integral_nm_rad"},
+    {"integral_gain", "velocity_loop", "integral_nm_rad", 1.0, Take::any},  // zero: a loop without an integrator
     {"disturbance_inertia", "motor", "inertia_kg_m2", 1.0, Take::unlike_model},
     {"load_inertia", "load", "inertia_kg_m2", 1.0, Take::unlike_model},
     {"load_stiffness", "load", "stiffness_nm_rad", 1.0, Take::unlike_model},
