@@ -396,13 +396,10 @@ std::optional<CandidateFit> backward_elimination(const BalanceSearch& search,
                                                  const std::vector<CandidateFit>& candidates) {
   const CandidateFit& first = candidates.front();
   BalanceSearch next{search.data, search.keep, first.fit};
-  // What makes the first one needless explains as much as that one does; half of it alone, as its nonlinear parameters
-  // may be found better with the first one in the model.
-  constexpr double kLeastAlone = 0.5;
   std::vector<CandidateFit> more = rank_candidates(next, [&](const CandidateModel& model) {
     return std::ranges::none_of(candidates, [&](const CandidateFit& alone) {
       return alone.model.entry == model.entry && alone.model.order == model.order &&
-             alone.gain.chi2_percent < kLeastAlone * first.gain.chi2_percent;
+             alone.gain.chi2_percent < kPolicy.least_alone_share * first.gain.chi2_percent;
     });
   });
   if (more.empty() || !passes(more.front())) return std::nullopt;

@@ -10,31 +10,26 @@
 namespace flexspline::selection {
 namespace {
 
-// The motion's filter is wider than the target's by this factor, as the columns are filtered once more.
-constexpr double kMotionOverRow = 2.5;
-// Share of a bandwidth up to which a wave is taken; a bandwidth that is wider by less is none of its own. So where the
-// highest order needs a wider one, it is at least the second.
-constexpr double kTakenShare = 0.7, kWider = 1.2, kLeastWidening = 1.25;
-
 // At the highest bandwidth; wider where waves over the motor's angle are above the bandwidth of the motion.
 estimation::PreparedData prepare(const std::vector<const data::Experiment*>& experiments, const model::Drive& drive,
                                  double highest_hz, const SelectionPolicy& policy) {
   double slowest_hz = 1e300;
   for (const data::Experiment* e : experiments) slowest_hz = std::min(slowest_hz, 1.0 / e->sample_s);
   estimation::Pipeline pipeline;
-  pipeline.motion_cutoff_hz = std::min(kMotionOverRow * highest_hz, 0.45 * slowest_hz);
+  pipeline.motion_cutoff_hz = std::min(policy.motion_over_row * highest_hz, 0.45 * slowest_hz);
   pipeline.mask = false;
   pipeline.row_cutoff_hz = highest_hz;
   estimation::PreparedData prepared = estimation::prepare_with(experiments, drive, pipeline);
   double widest_hz = highest_hz;
   // Where an order that the motor gives is above what the highest bandwidth takes, but hardly.
   const double order_hz = highest_order_hz(prepared);
-  const bool is_beyond = highest_order(drive) > policy.highest_order && order_hz > kTakenShare * highest_hz;
-  const double least_hz = is_beyond ? kLeastWidening * highest_hz : 0.0;
+  const bool is_beyond =
+      highest_order(drive) > policy.highest_order && order_hz > policy.wave_below_bandwidth * highest_hz;
+  const double least_hz = is_beyond ? policy.least_widening * highest_hz : 0.0;
   const double wanted_hz =
       std::min({std::max(1.5 * order_hz, least_hz), policy.widest_over_sampling * slowest_hz, policy.widest_hz});
   while (widest_hz < 0.99 * wanted_hz) widest_hz = std::min(2.0 * widest_hz, wanted_hz);
-  if (widest_hz <= kWider * highest_hz) return prepared;
+  if (widest_hz <= policy.wider_bandwidth * highest_hz) return prepared;
   pipeline.row_cutoff_hz = widest_hz;
   return estimation::prepare_with(experiments, drive, pipeline);
 }
@@ -89,8 +84,8 @@ const catalogue::Entry* presliding_law(const estimation::Terms& terms) {
 }
 
 bool CandidateTables::may_enter(const CandidateTerm& term, double cutoff_hz) const {
-  return term.highest_hz <= kTakenShare * cutoff_hz &&
-         (is_of_motion(cutoff_hz, bandwidth) || term.highest_hz > 0.35 * bandwidth.highest_hz);
+  return term.highest_hz <= kPolicy.wave_below_bandwidth * cutoff_hz &&
+         (is_of_motion(cutoff_hz, bandwidth) || term.highest_hz > kPolicy.wave_above_motion * bandwidth.highest_hz);
 }
 
 bool CandidateTables::shows_presliding(const std::pair<double, bool>& setting) const {
@@ -109,7 +104,7 @@ CandidateTables make_tables(const std::vector<const data::Experiment*>& experime
   tables.presliding_is_resolved = !travels || travels->is_resolved;
   tables.table = make_regressor_table(prepared, balance, terms, travels, highest_hz, policy);
   if (tables.table.model_columns == 0) return tables;
-  for (double f = prepared.pipeline.row_cutoff_hz; f > kWider * highest_hz; f *= 0.5)
+  for (double f = prepared.pipeline.row_cutoff_hz; f > policy.wider_bandwidth * highest_hz; f *= 0.5)
     for (const bool mask : {false, true}) tables.settings.emplace_back(f, mask);
   for (std::size_t b = 0; b < policy.bandwidths; ++b)
     for (const bool mask : {false, true})

@@ -21,10 +21,6 @@ using estimation::ParameterRef;
 using estimation::RegressionProblem;
 using estimation::Terms;
 
-// Placebo orders: none is within a fifth of a whole number or of a half.
-constexpr double kPlacebos[] = {1.27, 2.73, 3.29, 4.71, 5.29, 6.73, 8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
-constexpr double kFewestCycles = 2.0;
-
 // An effect at one value of its nonlinear parameters, with the model that has it, last.
 struct Extension {
   const catalogue::Entry& entry;
@@ -71,13 +67,13 @@ CandidateTerm term_of(const catalogue::Entry& entry, std::optional<double> order
 
 // Orders of which the data hold whole cycles; nothing where the effect has none.
 std::vector<std::optional<double>> orders_of(const catalogue::Entry& entry, const model::Drive& drive,
-                                             const Motion& motion) {
+                                             const Motion& motion, const SelectionPolicy& policy) {
   if (entry.count(Kind::given) == 0) return {std::nullopt};
   std::vector<std::optional<double>> orders;
   for (const double order : possible_orders(entry, drive))
-    if (motion.travel * order / motion.turn >= kFewestCycles) orders.emplace_back(order);
-  for (const double order : kPlacebos)
-    if (motion.travel * order / motion.turn >= kFewestCycles) orders.emplace_back(order);
+    if (motion.travel * order / motion.turn >= policy.fewest_cycles) orders.emplace_back(order);
+  for (const double order : policy.placebo_orders_resampled)
+    if (motion.travel * order / motion.turn >= policy.fewest_cycles) orders.emplace_back(order);
   return orders;
 }
 
@@ -226,7 +222,7 @@ std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& 
     if (entry.identified_on() != data.balance() && !(collapsed && info.balance == Balance::load)) continue;
     if (info.phase == Phase::shift || entry.has_state || entry.definition) continue;  // states: see presliding
     if (!may_be_seen(data, builder.terms, entry)) continue;
-    for (const std::optional<double>& order : orders_of(entry, drive, motion)) {
+    for (const std::optional<double>& order : orders_of(entry, drive, motion, builder.policy)) {
       if (has_phase_error(builder.terms, entry, order)) continue;
       Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0};
       try {

@@ -6,13 +6,12 @@
 #include <vector>
 
 #include "host/common/signals/butterworth.hpp"
+#include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
 namespace {
 
 constexpr double kRowsPerPeriod = 4.0;
-constexpr double kAtRest = 0.5;   // periods of the cut-off
-constexpr double kVisible = 3.0;  // velocities in units of their noise
 
 Eigen::Index reach_of(const Run& run, double cutoff_hz) {
   return static_cast<Eigen::Index>(std::lround(kFilterReach / (cutoff_hz * run.row_s)));
@@ -29,14 +28,14 @@ std::vector<SampleState> states_of(const RegressorTable& table, const Run& run, 
   for (Eigen::Index k = 0; k < n; ++k) {
     const double v = table.velocity_over_noise[run.first + k];
     const double before = k > 0 ? table.velocity_over_noise[run.first + k - 1] : v;
-    if (!std::isinf(v) && (std::abs(v) <= kVisible || v * before < 0.0))
+    if (!std::isinf(v) && (std::abs(v) <= kPolicy.visible_velocity || v * before < 0.0))
       set(k - reach, k + reach + 1, SampleState::near_reversal);
   }
   // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion.
-  const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kAtRest / (cutoff_hz * run.row_s)));
+  const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kPolicy.rest_periods / (cutoff_hz * run.row_s)));
   for (Eigen::Index k = 0; k < n;) {
     Eigen::Index end = k;
-    while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kVisible) ++end;
+    while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kPolicy.visible_velocity) ++end;
     if (end - k >= rest_rows) set(k - reach / 2, end + reach / 2, SampleState::at_rest);
     k = std::max(end, k + 1);
   }

@@ -9,9 +9,6 @@
 namespace flexspline::selection {
 namespace {
 
-// Coefficients below their bound by no more than that share of the target are noise about zero.
-constexpr double kSmall = 0.02;
-
 bool has_presliding(const std::vector<int>& terms) {
   return std::find(terms.begin(), terms.end(), kPreslidingTerm) != terms.end();
 }
@@ -87,7 +84,7 @@ bool is_possible(const RegressorTable& table, const std::vector<int>& terms, con
                  const HalfData& half) {
   const Eigen::MatrixXd& on = has_presliding(terms) ? half.presliding : half.sign;
   const Eigen::Index y = on.cols() - 1;
-  const double small = kSmall * std::sqrt(on(y, y));
+  const double small = kPolicy.noise_below_bound * std::sqrt(on(y, y));
   const auto check = [&](std::size_t at, double low) {
     const double value = fitted.theta[static_cast<Eigen::Index>(at)];
     const Eigen::Index c = fitted.columns[at];

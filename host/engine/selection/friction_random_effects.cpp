@@ -44,7 +44,6 @@ void eliminate_friction_effects(Eigen::MatrixXd& products, const FrictionRandomE
 
 Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& setting, Direction direction,
                                     const std::vector<double>& weights, double noise, const SelectionPolicy& policy) {
-  constexpr double kLeast = 0.005, kMost = 0.5;  // of the friction
   std::vector<Eigen::Index> fixed(static_cast<std::size_t>(table.model_columns));
   std::iota(fixed.begin(), fixed.end(), Eigen::Index{0});
   fixed.insert(fixed.end(), table.differences.begin(), table.differences.end());
@@ -65,7 +64,8 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
   }
   // Columns of the table are scaled; one unit is the friction over that scale.
   const Eigen::VectorXd variance =
-      estimation::reml(records, noise, kLeast, kMost, {policy.friction_difference, policy.friction_difference_records})
+      estimation::reml(records, noise, policy.least_friction_difference, policy.most_friction_difference,
+                       {policy.friction_difference, policy.friction_difference_records})
           .variance;
   return variance.cwiseProduct(size.cwiseAbs2());
 }

@@ -60,10 +60,8 @@ std::vector<Scaling> scalings(const estimation::Identification& base, const Regr
     const AsFriction added = as_friction(data, base.terms, own, slope_of(data, base.terms, candidate), weights);
     Scaling one{&candidate, meta_regression(part(own.values), part(added.added)), 1.0};
     const effects::ParameterInfo& info = entry.parameters.front();
-    // To first order a large coefficient comes out too large.
-    constexpr double kFirstOrder = 2.0;
     if (one.fit.freedom > 0.0 && one.fit.coefficient * info.usual > 0.0 &&
-        one.fit.coefficient < kFirstOrder * info.high)
+        one.fit.coefficient < kPolicy.scaling_over_range * info.high)
       one.p_value = numbers::student_t_above(one.fit.freedom, std::abs(one.fit.t));
     all.push_back(std::move(one));
   }
@@ -236,12 +234,10 @@ bool is_shown_between_records(std::size_t records, double p_value, bool held_out
 
 void take_back_unconfirmed_scaling(const estimation::Identification& base, const SearchedBalance& motor,
                                    Diagnosis& result) {
-  // So much of the signal's variance within records shows the effect there.
-  constexpr double kShownWithin = 0.25;
   const auto is_scaled = [](const NamedEffect& n) { return !n.order && is_scaling(catalogue::get(n.effect)); };
   if (result.verdict == Verdict::confusable_effects ||
       std::none_of(result.named.begin(), result.named.end(), is_scaled) ||
-      share_within_records(*motor.search.data) > kShownWithin)
+      share_within_records(*motor.search.data) > kPolicy.shown_within_records)
     return;
   const RegressionProblem& data = motor_balance_of(base);
   const RecordFriction own = friction_by_record(base, data, 1);

@@ -74,9 +74,8 @@ void add_angle_curves(TableBuilder& builder) {
 // Friction over a turn of the motor, as a Fourier series: a tooth that is damaged, say, which no single order
 // describes.
 void add_friction_over_turn(TableBuilder& builder, const Motion& motion) {
-  constexpr double kFewestTurns = 2.0;
   // In one direction it is a ripple of torque.
-  if (motion.travel < kFewestTurns * motion.turn || !moves_both_ways(builder.sign.data)) return;
+  if (motion.travel < builder.policy.fewest_cycles * motion.turn || !moves_both_ways(builder.sign.data)) return;
   const auto wave = [&](const DirectedData& d, int order, double phase) {
     return d.at_rows([&](const estimation::Record& r, std::size_t k) {
       return DirectedData::direction(r, k) *

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include "host/common/algebra/decompositions.hpp"
+#include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
 
@@ -11,8 +12,6 @@ using estimation::PreparedData;
 using estimation::Record;
 
 std::size_t take_noise_off_torque(PreparedData& prepared) {
-  constexpr double kWhite =
-      0.5;  // semivariance of neighbours over the variance: 1 for white noise, 0 for a slow signal
   constexpr Eigen::Index kRowsPerColumn = 20;
   std::size_t replaced = 0;
   for (Record& r : prepared.records) {
@@ -35,7 +34,7 @@ std::size_t take_noise_off_torque(PreparedData& prepared) {
     const Eigen::VectorXd rest = measured - fitted;
     double steps = 0.0;
     for (Eigen::Index k = 1; k < n; ++k) steps += 0.5 * (rest[k] - rest[k - 1]) * (rest[k] - rest[k - 1]);
-    if (!(steps > kWhite * rest.squaredNorm())) continue;
+    if (!(steps > kPolicy.torque_noise_share * rest.squaredNorm())) continue;
     r.inputs.torque.assign(fitted.data(), fitted.data() + n);
     ++replaced;
   }

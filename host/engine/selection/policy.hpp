@@ -2,6 +2,7 @@
 // of METHOD.md.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include "host/engine/selection/named_score.hpp"
@@ -18,10 +19,26 @@ struct SelectionPolicy {
   // The same for waves over the motor's angle.
   double widest_hz = 200.0;
   double widest_over_sampling = 0.4;
+  // The motion's filter over the target's, as the columns are filtered once more.
+  double motion_over_row = 2.5;
+  // Share of a bandwidth up to which a wave is taken, and of the motion's bandwidth from which on a wider one takes it.
+  double wave_below_bandwidth = 0.7;
+  double wave_above_motion = 0.35;
+  // A bandwidth that is wider by less is none of its own. Where the highest order needs a wider one, it is at least the
+  // second.
+  double wider_bandwidth = 1.2;
+  double least_widening = 1.25;
   // Share of the variance of an acceleration that may be noise of the position: the attenuation of the inertia.
   double acceleration_noise_share = 0.02;
   // Noise of the inertia's torque over the residual, as variances: what noise of a regressor may add to the residual.
   double regressor_noise_share = 0.05;
+  // Semivariance of neighbours over the variance, 1 for white noise and 0 for a slow signal: above, what the load's
+  // model leaves of a measured torque is noise of its sensor.
+  double torque_noise_share = 0.5;
+  // A motor that moves by that many standard errors of its velocity is in motion; that many periods of the cut-off
+  // without are rest.
+  double visible_velocity = 3.0;
+  double rest_periods = 0.5;
 
   // Resampling: complementary pairs (Shah and Samworth 2013, who use 50).
   std::size_t blocks = 24;
@@ -46,10 +63,13 @@ struct SelectionPolicy {
   double least_gain = 6.0;
   // A subsample without that share of its squares above the noise abstains.
   double least_excess = 0.03;
+  // Coefficients below their bound by no more than that share of the target are noise about zero.
+  double noise_below_bound = 0.02;
 
   double curve_discount = 0.8;  // a law has to take off at least this share of what any curve does
   double similar = 0.9;         // terms that take off that share of the best one's are not distinguished,
   double similar_left = 2.0;    // unless they leave that many times the squares above the noise
+  double often_similar = 0.3;   // of the subsamples that chose a term: an alternative so often belongs to its group
 
   double group_frequency = 0.5;      // of the subsamples that chose the first of a group; and from which on a term that
                                      // was chosen first is not behind a structure that is in no catalogue
@@ -65,6 +85,8 @@ struct SelectionPolicy {
   // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly: a prior worth that many records.
   double friction_difference = 0.03;
   double friction_difference_records = 2.0;
+  double least_friction_difference = 0.005;
+  double most_friction_difference = 0.5;
 
   // Error on experiments that are held out, with a term over without it: above, the term is not named.
   double most_held_out_ratio = 1.0;
@@ -115,6 +137,9 @@ struct SelectionPolicy {
   double named_score = kNamedScore;
   // Percent of the left-out chi-square: an effect must matter, not only be there (step 7).
   double named_chi2_percent = 0.5;
+  // What makes an effect needless explains as much as that one does; half of it alone, as its nonlinear parameters may
+  // be found better with the other in the model.
+  double least_alone_share = 0.5;
   // Score within which two effects are not distinguished (step 12).
   double confounded_margin = 10.0;
   // Difference of the BIC of two models from which on it is positive evidence for one of them (Kass and Raftery 1995).
@@ -161,9 +186,14 @@ struct SelectionPolicy {
   std::size_t orders_tried = 3;      // those that the residual holds most of
   std::size_t orders_resampled = 6;  // likewise, of each effect and of as many placebos, on halves of the data
   double usual_order_share = 0.9;    // of the best one's squares: from there the usual order is tried, too
-  // Placebo orders, which no gear, motor or bearing makes: in data of few turns they explain as much as any.
+  double fewest_cycles = 2.0;        // of an order in the data; and turns of the motor, for friction over a turn
+  // Placebo orders, which no gear, motor or bearing makes: in data of few turns they explain as much as any. Likelihood
+  // compares with those from the first on, each one more; halves choose from a list of which none is within a fifth of
+  // a whole number or of a half, as its waves would be theirs in short records.
   double first_placebo_order = 0.63;
   int placebo_orders = 24;
+  std::array<double, 12> placebo_orders_resampled{1.27, 2.73, 3.29,  4.71,  5.29,  6.73,
+                                                  8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
   double least_over_placebo = 1.5;  // squares over those of the best placebo (by hand, records of one to five turns)
   // Where nothing but noise is left, likelihood distinguishes orders although a wrong one may explain most of it: score
   // over that of any placebo.
@@ -219,9 +249,11 @@ struct SelectionPolicy {
   double range_p_value = 0.01;        // of a law that holds for the slower or the faster records: is told, not named
   std::size_t fewest_of_scaling = 4;  // records: with fewer a line through them has one degree of freedom
   double scaling_p_value = 1e-3;      // of an effect that scales friction by a recorded signal, for all that were tried
-  double trend_size = 0.03;           // of the parameter, over the records
-  double least_drift = 0.01;          // relative standard deviation of friction between records that is reported
-  double drift_deviance = 12.0;       // twice the log-likelihood ratio of random effects against none
+  double scaling_over_range = 2.0;    // of its coefficient over the range's end: to first order it comes out too large
+  double shown_within_records = 0.25;  // share of the signal's variance within records from which on they show it
+  double trend_size = 0.03;            // of the parameter, over the records
+  double least_drift = 0.01;           // relative standard deviation of friction between records that is reported
+  double drift_deviance = 12.0;        // twice the log-likelihood ratio of random effects against none
 };
 
 // The policy that all commands follow.

@@ -229,7 +229,6 @@ void count_steps(const RegressorTable& table, const SelectionPath& vote, bool ma
 
 // Of a term that was chosen at least once.
 Frequency frequency_of(Count& c) {
-  constexpr double kOften = 0.3;
   c.f.frequency = c.chosen / c.all();
   c.f.first = c.first / c.all();
   c.f.near = (c.chosen_or_near[0] + c.chosen_or_near[1]) / c.all();
@@ -238,7 +237,7 @@ Frequency frequency_of(Count& c) {
     if (c.offered[mask] > 0.0)
       c.f.least_near_by_mask = std::min(c.f.least_near_by_mask, c.chosen_or_near[mask] / std::max(1.0, c.voted[mask]));
   for (const auto& [other, times] : c.alternatives)
-    if (times >= kOften * c.chosen) c.f.alternatives.emplace_back(other, times / c.chosen);
+    if (times >= kPolicy.often_similar * c.chosen) c.f.alternatives.emplace_back(other, times / c.chosen);
   std::sort(c.shares.begin(), c.shares.end());
   const auto quantile_of_shares = [&](double q) {
     return c.shares[static_cast<std::size_t>(std::lround(q * static_cast<double>(c.shares.size() - 1)))];
