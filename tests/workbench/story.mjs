@@ -103,6 +103,7 @@ async function flash(page) {
   assert.match(await page.locator("[data-preview]").innerText(), /→.*\([+−×±].*\)|added/s);
   assert.equal(await page.locator("[data-flashed]").count(), 0);
   await idle(page);
+  assert.match(await page.locator("[data-predicted]").innerText(), /Predicted at slow reversals: \S+ mrad with this model/);
   await shot(page, "9-preview");
   await page.locator("[data-confirm]").click();
   await page.waitForSelector("[data-flashed=yes]");
@@ -380,6 +381,12 @@ try {
       for (const tab of ["Steps", "Parameters", "Save", "Closed loop", "Drive"]) {
         await small.getByRole("tab", { name: tab }).click();
         assert.ok((await small.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `${tab} is wider than ${width} px`);
+      }
+      // The button that adds holds the candidate's name, however long.
+      await small.waitForSelector("[data-verdict]");
+      for (const candidate of width < 640 ? await small.locator("[role=option][data-effect]").all() : []) {
+        await candidate.click();
+        assert.ok((await small.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `${await candidate.getAttribute("data-effect")} makes the page wider than ${width} px`);
       }
       // It can be reached and pressed, too.
       await small.getByRole("button", { name: "Flash this model" }).click({ trial: true });
