@@ -33,6 +33,22 @@ json answer_of(const Shell& shell, const std::string& line, int code) {
   return json::parse(answer.out, nullptr, false);
 }
 
+// A question is asked on a terminal only; script is one.
+TEST(Commission, WritesItsJsonAlsoWhereThePersonDeclines) {
+  const Shell shell;
+  const TwinProcess twin(words({}));
+  const Answer answer = shell.run("printf 'n\\n' | script -qec 'flexspline commission --json no.json --drive " +
+                                  twin.name() + "' /dev/null");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+  EXPECT_TRUE(contains(answer.out, "Nothing was moved")) << answer.out;
+  const json no = json::parse(shell.file("no.json"), nullptr, false);
+  EXPECT_EQ(no["format"], "flexspline-commission/1");
+  EXPECT_EQ(no["end"], "none");
+  EXPECT_EQ(no["runs"], 0);
+  EXPECT_FALSE(no["stored"].get<bool>());
+  EXPECT_TRUE(no["result"].is_null());
+}
+
 TEST(Commission, FindsTheMotorOfTheTwinKeepsItAndTheDriveFollowsAfterAPowerCut) {
   for (const int seed : {1, 2}) {
     const Shell shell;

@@ -95,6 +95,14 @@ TEST(BadInput, ArgumentsThatAreMissingOrWrongAreNamed) {
                  {"speed", "motor_velocity_rad_s"});
 }
 
+TEST(BadInput, ANumberWithACommaIsRefusedAndItIsSaidHowToWriteIt) {
+  const Shell shell;
+  const Answer answer = shell.run("flexspline new --from log.csv --out project --gear-ratio 1,000");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(contains(answer.err, "\"1,000\" is not a number above zero; write it without a comma, as 1000 or 0.05"))
+      << answer.err;
+}
+
 TEST(BadInput, AFolderThatIsInTheWayIsNotWrittenOver) {
   const Shell shell;
   shell.record();

@@ -56,6 +56,26 @@ TEST_F(Report, OfIdentifyHoldsParametersWithSpreads) {
   EXPECT_TRUE(document["rounds"].empty());
 }
 
+TEST_F(Report, OfAnOpenedModelHasTheIntervalsThatIdentifyFound) {
+  shell_.must(std::string("flexspline identify ") + kData +
+              " --model demo-out/base-model.toml --out again.toml --json found.json" + kHeldOut);
+  const nlohmann::json found = nlohmann::json::parse(shell_.file("found.json"))["parameters"];
+  const nlohmann::json opened =
+      page_of(std::string("flexspline compare --model again.toml ") + kData, "opened.html")["parameters"];
+  std::size_t compared = 0;
+  for (const nlohmann::json& p : found)
+    for (const nlohmann::json& q : opened) {
+      if (p["id"] != q["id"] || p["parameter"] != q["parameter"] || p["interval"][0].is_null()) continue;
+      const auto width = [](const nlohmann::json& one) {
+        return one["interval"][1].get<double>() - one["interval"][0].get<double>();
+      };
+      // The file has three digits of it.
+      EXPECT_NEAR(width(q) / width(p), 1.0, 0.006) << p;
+      ++compared;
+    }
+  EXPECT_GT(compared, 5u);
+}
+
 TEST_F(Report, OfCompareHasTheNumbersOfItsJson) {
   const nlohmann::json document =
       page_of(std::string("flexspline compare --model fitted.toml ") + kData + " --json c.json", "c.html");

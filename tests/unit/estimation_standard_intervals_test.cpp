@@ -8,6 +8,7 @@
 #include <random>
 
 #include "host/common/signals/butterworth.hpp"
+#include "host/engine/estimation/estimate.hpp"
 #include "host/engine/estimation/regressor_noise.hpp"
 #include "tests/unit/estimation_intervals_that_hold.hpp"
 
@@ -103,6 +104,19 @@ TEST(RegressorNoise, LetsTheIntervalOfTheAttenuatedStiffnessHoldItsTruth) {
                                                      spring(), {kCutoff, false}, kStiffness, [](const auto&) {});
   EXPECT_EQ(held.before, 0);
   EXPECT_GE(held.after, 9);
+}
+
+// A model file has one number for an error, and its readers make an interval of it.
+TEST(StoredStd, GivesTheIntervalThatWasFoundWithItsBiases) {
+  const data::Dataset dataset = noisy_spring(4e-4, 1);
+  const auto found = estimate(dataset, spring(), {kCutoff, false}, {});
+  const Estimate& stiffness = found->estimates.front();
+  ASSERT_TRUE(stiffness.std && stiffness.low && stiffness.high);
+  ASSERT_GT(*stiffness.high - *stiffness.low, 1.2 * 2.0 * 1.96 * *stiffness.std) << "the case needs a bias";
+  const model::Parameter& stored = found->model.effects.front().parameters.front();
+  const Interval again = interval_95(*stored.value, *stored.std);
+  EXPECT_NEAR(again.low, *stiffness.low, 1e-6 * kStiffness);
+  EXPECT_NEAR(again.high, *stiffness.high, 1e-6 * kStiffness);
 }
 
 TEST(RegressorNoise, IsNothingWhereThePositionIsExact) {

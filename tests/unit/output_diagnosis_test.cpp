@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "host/engine/selection/add_until_complete.hpp"
+
 namespace flexspline::output::output_diagnosis_test {
 namespace {
 
@@ -79,11 +81,11 @@ TEST(DiagnosisAnswer, DoesNotSayThatTheNoiseIsUnknownWhereItIsKnown) {
 }
 
 // Of each round only the first name is added to the model.
-TEST(DiagnosisAnswer, OfSeveralRoundsNamesWhatWasAdded) {
+TEST(DiagnosisAnswer, OfSeveralRoundsNamesWhatWasAddedAndIsKept) {
   selection::Diagnosis first, last;
   first.verdict = selection::Verdict::missing_effect;
   first.named = {{"gravity", std::nullopt}, {"torque_ripple", 2.0}};
-  const nlohmann::json named = rounds_json({first, last}, {}).at("named");
+  const nlohmann::json named = rounds_json({first, last}, {{"gravity", std::nullopt}}).at("named");
   ASSERT_EQ(named.size(), 1u);
   EXPECT_EQ(named[0].at("effect"), "gravity");
 }
@@ -93,10 +95,29 @@ TEST(DiagnosisAnswer, DoesNotNameTheOnlyEffectWhereItWasRemovedAgain) {
   first.verdict = selection::Verdict::missing_effect;
   first.named = {{"gravity", std::nullopt}};
   last.verdict = selection::Verdict::at_noise_floor;
-  const nlohmann::json answer = rounds_json({first, last}, {"gravity"});
+  const nlohmann::json answer = rounds_json({first, last}, {});
   EXPECT_TRUE(answer.at("named").empty()) << answer.at("named");
   EXPECT_EQ(answer.at("verdict"), "at_noise_floor");
   EXPECT_EQ(rounds_json({first}, {}).at("named").size(), 1u);
+}
+
+TEST(DiagnosisAnswer, NamesAnEffectOnceThatWasRemovedAndAddedAgain) {
+  const selection::NamedEffect gravity{"gravity", std::nullopt}, ripple{"torque_ripple", 2.0};
+  selection::StepwiseSelection done;
+  done.rounds.resize(4);
+  done.note_added(gravity);
+  done.note_added(ripple);
+  EXPECT_FALSE(done.note_removed("gravity"));
+  EXPECT_EQ(done.removed, std::vector<std::string>{"gravity"});
+  done.note_added(gravity);
+  EXPECT_TRUE(done.removed.empty()) << "it is in the model";
+  const nlohmann::json named = rounds_json(done.rounds, done.kept).at("named");
+  ASSERT_EQ(named.size(), 2u);
+  EXPECT_EQ(named[0].at("effect"), "torque_ripple");
+  EXPECT_EQ(named[1].at("effect"), "gravity");
+  EXPECT_TRUE(done.note_removed("gravity")) << "a second time, which ends the search";
+  EXPECT_EQ(done.removed, std::vector<std::string>{"gravity"});
+  EXPECT_EQ(rounds_json(done.rounds, done.kept).at("named").size(), 1u);
 }
 
 TEST(DiagnosisAnswer, HasPossibleEffectsInItsJson) {

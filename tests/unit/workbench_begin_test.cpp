@@ -137,6 +137,16 @@ TEST_F(WorkbenchBegin, ARecordingIsDroppedColumnsAreChosenAndAModelIsThere) {
   EXPECT_TRUE(again.contains("problem"));
 }
 
+TEST_F(WorkbenchBegin, ThePitchOfALinearAxisIsAChoice) {
+  const std::string tab = new_tab();
+  ASSERT_EQ(drop(tab, "log.csv", log()), 200);
+  state_after_work(tab);
+  act(tab, {{"do", "propose"}, {"choices", {{"axis", "linear"}, {"pitch_m", 0.005}}}});
+  state_after_work(tab);
+  EXPECT_EQ(choices_.pitch_m, 0.005);
+  act(tab, {{"do", "propose"}, {"choices", {{"pitch_m", 0}}}}, 400);
+}
+
 TEST_F(WorkbenchBegin, ForeignRecordingsInATabWithAModelAreAskedForAndAdded) {
   const std::string tab = new_tab();
   ASSERT_EQ(drop(tab, "log.csv", log()), 200);

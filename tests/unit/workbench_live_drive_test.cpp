@@ -9,6 +9,7 @@
 
 #include "hil/twin/factory_block.hpp"
 #include "hil/twin/twin_drive.hpp"
+#include "host/app/workbench/closed_loop_run.hpp"
 #include "host/drive_link/deployment/bases.hpp"
 #include "tests/support/loopback.hpp"
 #include "tests/unit/comparison_test_drive.hpp"
@@ -178,6 +179,30 @@ TEST_F(WorkbenchLiveDrive, APreviewChangesNothingAndNothingElseThanItShowsIsFlas
   EXPECT_THROW(live_.restore(shown), drive::DriveError);
   live_.restore(PreviewedBlocks{shown.after, shown.before});
   EXPECT_EQ(live_.status()["block"]["sha256"], shown.before);
+}
+
+TEST_F(WorkbenchLiveDrive, APreviewComesWithTheGainThatFlashPredicts) {
+  const auto say = [](std::string_view) {};
+  ComparedBlocks blocks;
+  live_.preview_flash(other_model(), say, &blocks);
+  ASSERT_FALSE(blocks.made.empty());
+  EXPECT_TRUE(std::ranges::equal(blocks.active, bench_.drive.store().active()));
+  std::size_t runs = 0;
+  const closed_loop::Runner run = [&](const std::vector<closed_loop::Job>& jobs) {
+    std::vector<closed_loop::Outcome> outcomes(jobs.size());
+    for (std::size_t k = 0; k < jobs.size(); ++k) outcomes[k].rms_error_rad = jobs[k].compensation ? 2e-4 : 1e-3;
+    runs += jobs.size();
+    return outcomes;
+  };
+  const json found = predicted_gain(other_model(), blocks, run, say);
+  EXPECT_NEAR(found["ratio"].get<double>(), 0.2, 1e-9) << found;
+  EXPECT_NE(found["in_words"].get<std::string>().find("0.2 mrad with this model, 1 mrad without"), std::string::npos)
+      << found;
+  EXPECT_GE(runs, 8u);
+  const closed_loop::Runner broken = [](const std::vector<closed_loop::Job>&) -> std::vector<closed_loop::Outcome> {
+    throw std::runtime_error("there is no twin");
+  };
+  EXPECT_EQ(predicted_gain(other_model(), blocks, broken, say)["problem"], "there is no twin");
 }
 
 TEST_F(WorkbenchLiveDrive, AnotherDriveInItsPlaceIsNotConnected) {

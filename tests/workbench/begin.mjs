@@ -2,7 +2,7 @@
 // model is there. At three widths, light and dark, with screenshots.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { readFileSync, mkdirSync, rmSync } from "node:fs";
+import { readFileSync, mkdirSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { createRequire } from "node:module";
 
@@ -45,6 +45,19 @@ async function accessible(page, where) {
   assert.deepEqual(serious.map((v) => `${v.id}: ${v.nodes.slice(0, 3).map((n) => `${n.target} ${n.failureSummary}`).join("; ")}`), [], where);
 }
 
+// A file or a folder, as the mouse drops it.
+async function dropPath(page, path) {
+  const devtools = await page.context().newCDPSession(page);
+  for (const type of ["dragEnter", "dragOver", "drop"])
+    await devtools.send("Input.dispatchDragEvent", { type, x: 100, y: 300, data: { items: [], files: [path], dragOperationsMask: 1 } });
+  await devtools.detach();
+}
+for (const folder of ["papers", "recordings", "recordings/older"]) mkdirSync(join(work, folder));
+writeFileSync(join(work, "papers", "notes.pdf"), "no recording");
+writeFileSync(join(work, "recordings", "notes.pdf"), "no recording");
+writeFileSync(join(work, "recordings", "joint.csv"), log());
+writeFileSync(join(work, "axis.csv"), log().replace("stamp;q;qd;i_q;T_housing", "t;x_mm;v_mm_s;force;T_housing"));
+
 let failed = false;
 try {
   for (const [width, height, colorScheme] of [[1280, 720, "light"], [768, 1024, "dark"], [390, 844, "light"]]) {
@@ -60,23 +73,30 @@ try {
     await shot("1-empty");
     await fits("the empty page");
     await accessible(page, "empty");
-    const transfer = await page.evaluateHandle((text) => {
-      const t = new DataTransfer();
-      t.items.add(new File([text], "joint.csv"));
-      return t;
-    }, log());
-    await page.dispatchEvent("body", "drop", { dataTransfer: transfer });
+    await dropPath(page, join(work, "papers"));
+    await until(page, () => /There is no recording in the folder papers/.test(document.querySelector(".note").textContent));
+    await dropPath(page, join(work, "gone.csv"));
+    await until(page, () => /gone.csv: not sent. Check that the files are still there/.test(document.querySelector(".note").textContent));
+    assert.ok(complaints.splice(0).every((one) => one.includes("/api/drop")), "of that request alone");
+    await dropPath(page, join(work, "recordings"));
     await page.waitForSelector("[data-column=current_a] .sparkline");
     await idle(page);
     await page.locator("[data-fact=gear_ratio]").fill("1:100");
     await until(page, () => /Gear ratio: .1:100. is not a number/.test(document.querySelector(".note").textContent));
+    await page.locator("[data-fact=gear_ratio]").fill("1,000");
+    await until(page, () => /Gear ratio: .1,000. is not a number above zero. Type it without a comma, as 1000/.test(document.querySelector(".note").textContent));
     await page.locator("[data-fact=gear_ratio]").fill("100");
     await until(page, () => document.querySelector(".beginning").dataset.can === "no");
+    // What the reader has opened stays open while work says how far it is.
+    await page.locator("details[data-key=notes] summary").click();
+    const notes = await page.locator("details[data-key=notes]").elementHandle();
     await shot("2-asked");
     await idle(page);
     // Of which side the position is, the names do not say.
     await page.locator("[data-fact=position_side]").selectOption("link");
     await until(page, () => document.querySelector(".beginning").dataset.can === "yes");
+    assert.ok(!(await notes.evaluate((e) => e.isConnected)), "the page was drawn again");
+    assert.ok(await page.locator("details[data-key=notes]").evaluate((e) => e.open), "and the list is open");
     await page.locator("[data-fact=torque_constant_nm_a]").fill("0.1");
     for (const [column, unit] of [["motor_position_rad", "deg"], ["motor_velocity_rad_s", "deg/s"]]) {
       await idle(page);
@@ -106,6 +126,19 @@ try {
     await shot("4-model");
     await context.close();
   }
+  // Of a linear axis the pitch is asked for.
+  const linear = await browser.newPage();
+  linear.setDefaultTimeout(kPatience);
+  await linear.goto(address);
+  await linear.waitForSelector("[data-pick]");
+  await dropPath(linear, join(work, "axis.csv"));
+  await linear.waitForSelector("[data-fact=pitch_m]");
+  await idle(linear);
+  await linear.locator("details[data-key=notes] summary").click();
+  assert.match(await linear.locator("details[data-key=notes]").innerText(), /the pitch is not known.*; type it above/);
+  await linear.locator("[data-fact=pitch_m]").fill("0.005");
+  await until(linear, () => !/pitch/.test(document.querySelector("details[data-key=notes]").textContent));
+  assert.ok(await linear.locator("details[data-key=notes]").evaluate((e) => e.open));
   assert.deepEqual(complaints, []);
 } catch (error) {
   failed = true;

@@ -103,6 +103,7 @@ async function flash(page) {
   assert.match(await page.locator("[data-preview]").innerText(), /→.*\([+−×±].*\)|added/s);
   assert.equal(await page.locator("[data-flashed]").count(), 0);
   await idle(page);
+  assert.match(await page.locator("[data-predicted]").innerText(), /Predicted at slow reversals: \S+ mrad with this model/);
   await shot(page, "9-preview");
   await page.locator("[data-confirm]").click();
   await page.waitForSelector("[data-flashed=yes]");
@@ -381,6 +382,11 @@ try {
         await small.getByRole("tab", { name: tab }).click();
         assert.ok((await small.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `${tab} is wider than ${width} px`);
       }
+      // The button that adds holds the candidate's name, however long.
+      await small.waitForSelector("[data-add]");
+      await idle(small);
+      await small.evaluate(() => { document.querySelector("[data-add]").textContent = "Add prandtl ishlinskii hysteresis of the second stage, 21 per turn"; });
+      assert.ok((await small.evaluate(() => document.documentElement.scrollWidth - innerWidth)) <= 0, `the button that adds is wider than ${width} px`);
       // It can be reached and pressed, too.
       await small.getByRole("button", { name: "Flash this model" }).click({ trial: true });
       await small.screenshot({ path: join(shots, `${width}-${colorScheme}.png`), fullPage: true });

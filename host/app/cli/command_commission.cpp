@@ -176,6 +176,27 @@ void conclude(drive::Session& session, const DriveFacts& b, const CommissionOpti
   console.line(fmt::format("{} in the parameter block of the drive; flash keeps it.", console.good("Stored")));
 }
 
+// Before anything was measured.
+json answer_of(const drive::Session& session, const DriveFacts& facts) {
+  return {{"format", "flexspline-commission/1"},
+          {"drive", {{"serial", session.serial()}, {"drive", session.name()}}},
+          {"test",
+           {{"current_a", facts.setup.current_a},
+            {"most_current_a", facts.setup.most_current_a},
+            {"bus_v", facts.setup.bus_v},
+            {"most_speed_rad_s", 2.0 * std::numbers::pi * facts.setup.most_shaft_hz},
+            {"most_turns", facts.setup.most_travel_turns}}},
+          {"end", drive::name_of(CommissioningState::none)},
+          {"step", nullptr},
+          {"seconds", 0.0},
+          {"runs", 0},
+          {"fault", nullptr},
+          {"result", nullptr},
+          {"current_loop", nullptr},
+          {"warnings", json::array()},
+          {"stored", false}};
+}
+
 int run(const CommissionOptions& options, Console& console) {
   const auto signer = pairing_signer(options.pairing_key);
   drive::Session session = open_drive(options.drive);
@@ -183,8 +204,10 @@ int run(const CommissionOptions& options, Console& console) {
   const DriveFacts facts = facts_of(session, options);
   drive::require_access(session, signer);
   print_plan(facts, console);
+  json answer = answer_of(session, facts);
   if (!confirmed("Is the load off?", options.yes)) {
     console.line("Nothing was moved.");
+    output::save_json(options.json, answer);
     return kDone;
   }
   std::vector<control::commissioning::Result> results;
@@ -194,23 +217,10 @@ int run(const CommissionOptions& options, Console& console) {
     end = measure(session, facts, options, console, results);
   }
   const bool is_done = end.state == CommissioningState::done;
-  json answer = {{"format", "flexspline-commission/1"},
-                 {"drive", {{"serial", session.serial()}, {"drive", session.name()}}},
-                 {"test",
-                  {{"current_a", facts.setup.current_a},
-                   {"most_current_a", facts.setup.most_current_a},
-                   {"bus_v", facts.setup.bus_v},
-                   {"most_speed_rad_s", 2.0 * std::numbers::pi * facts.setup.most_shaft_hz},
-                   {"most_turns", facts.setup.most_travel_turns}}},
-                 {"end", drive::name_of(end.state)},
-                 {"step", deployment::commissioning_step_text(end.step)},
-                 {"seconds", end.periods / facts.setup.pwm_hz},
-                 {"runs", results.size()},
-                 {"fault", nullptr},
-                 {"result", nullptr},
-                 {"current_loop", nullptr},
-                 {"warnings", json::array()},
-                 {"stored", false}};
+  answer["end"] = drive::name_of(end.state);
+  answer["step"] = deployment::commissioning_step_text(end.step);
+  answer["seconds"] = end.periods / facts.setup.pwm_hz;
+  answer["runs"] = results.size();
   if (is_done) {
     conclude(session, facts, options, results, answer, console);
   } else {

@@ -73,7 +73,7 @@ int run(const DiagnoseOptions& options, Console& console) {
     console.line(fmt::format(
         "{} was removed: with the other effects in the model it no longer reduces the error significantly.", effect));
   write_page(options, dataset, file.model, done.model, done.rounds, console);
-  output::save_json(options.json, options.all ? output::rounds_json(done.rounds, done.removed)
+  output::save_json(options.json, options.all ? output::rounds_json(done.rounds, done.kept)
                                               : output::diagnosis_json(done.rounds.front()));
   return kDone;
 }

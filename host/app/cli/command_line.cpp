@@ -30,7 +30,9 @@ CLI::Validator sign_check(bool zero_is_allowed) {
         double value = 0.0;
         const bool good = CLI::detail::lexical_cast(text, value) && (value > 0.0 || (zero_is_allowed && value == 0.0));
         if (good) return std::string();
-        return fmt::format("\"{}\" is not a number {}", text, zero_is_allowed ? "from zero on" : "above zero");
+        const bool has_comma = text.find(',') != std::string::npos;
+        return fmt::format("\"{}\" is not a number {}{}", text, zero_is_allowed ? "from zero on" : "above zero",
+                           has_comma ? "; write it without a comma, as 1000 or 0.05" : "");
       },
       name);
 }

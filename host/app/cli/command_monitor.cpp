@@ -90,8 +90,8 @@ struct Sample {
 
 class Screen {
  public:
-  Screen(std::vector<Channel> channels, Console& console)
-      : channels_(std::move(channels)), console_(console), history_(channels_.size()) {}
+  Screen(std::vector<Channel> channels, const drive::Scales& scales, Console& console)
+      : channels_(std::move(channels)), scales_(scales), console_(console), history_(channels_.size()) {}
 
   // `reason`: of its fault; empty: not known yet.
   void show(const Sample& s, const std::string& reason) {
@@ -108,9 +108,8 @@ class Screen {
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       history_[i].push_back(s.values[i]);
       if (history_[i].size() > kHistory) history_[i].pop_front();
-      const protocol::ChannelText& c = protocol::text_of(channels_[i]);
-      line(fmt::format("{:<20}{:>12} {:<8} {}", c.name, output::number(s.values[i], 5), c.unit,
-                       console_.dim(sparkline(history_[i]))));
+      line(fmt::format("{:<20}{:>12} {:<8} {}", protocol::text_of(channels_[i]).name, output::number(s.values[i], 5),
+                       scales_.unit(channels_[i]), console_.dim(sparkline(history_[i]))));
       if (channels_[i] == Channel::feedforward_torque) feedforward = s.values[i];
       if (channels_[i] == Channel::command_torque) command = s.values[i];
     }
@@ -122,6 +121,7 @@ class Screen {
 
  private:
   std::vector<Channel> channels_;
+  const drive::Scales& scales_;
   Console& console_;
   std::vector<std::deque<double>> history_;
   int lines_ = 0;
@@ -139,7 +139,7 @@ class Monitor {
         tick_hz_(session.identity().tick_hz),
         every_(static_cast<std::uint16_t>(std::clamp(std::round(tick_hz_ / options.rate_hz), 1.0, 65535.0))),
         is_terminal_(isatty(STDOUT_FILENO) != 0 && options.json != "-"),
-        screen_(channels_, console) {}
+        screen_(channels_, scales_, console) {}
 
   void run() {
     if (!is_terminal_) print_head();
@@ -166,8 +166,7 @@ class Monitor {
 
   json answer() const {
     json names = json::array();
-    for (const Channel c : channels_)
-      names.push_back({{"name", protocol::text_of(c).name}, {"unit", protocol::text_of(c).unit}});
+    for (const Channel c : channels_) names.push_back({{"name", protocol::text_of(c).name}, {"unit", scales_.unit(c)}});
     return {{"format", "flexspline-monitor/1"},
             {"drive", {{"serial", session_.serial()}, {"board", session_.board()}}},
             {"channels", names},
@@ -181,7 +180,7 @@ class Monitor {
     std::string head = "time_s,mode,fault";
     for (const Channel c : channels_)
       head += fmt::format(",{}{}", protocol::text_of(c).name,
-                          protocol::text_of(c).unit.empty() ? "" : fmt::format(" [{}]", protocol::text_of(c).unit));
+                          scales_.unit(c).empty() ? "" : fmt::format(" [{}]", scales_.unit(c)));
     console_.line(head);
   }
 

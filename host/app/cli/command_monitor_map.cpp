@@ -21,6 +21,12 @@ using drive::MapVerdict;
 using drive::ResidualMap;
 using nlohmann::json;
 
+const char* torque_unit(const ResidualMap& map) {
+  return map.is_linear ? "N" : "N*m";
+}
+const char* velocity_unit(const ResidualMap& map) {
+  return map.is_linear ? "m/s" : "rad/s";
+}
 std::string text_of(const ResidualMap::Range& v) {
   if (std::isinf(v.low)) return fmt::format("below {}", output::number(v.high, 3));
   if (std::isinf(v.high)) return fmt::format("above {}", output::number(v.low, 3));
@@ -38,10 +44,10 @@ void show(const ResidualMap& map, Console& console) {
   double largest = 0.0;
   for (const drive::ResidualBin& bin : map.bins) largest = std::max(largest, std::abs(bin.mean_nm));
   console.line(
-      fmt::format("Measured less modelled torque over motor angle (0 to 1 turn, left to right), {:.3g} s in "
-                  "all;\na full bar is {} N*m, half of one zero, a dot nothing yet:",
-                  map.seconds(), output::number(largest, 3)));
-  console.line(fmt::format("{:>20}", "velocity, rad/s"));
+      fmt::format("Measured less modelled {} over motor angle (0 to 1 turn, left to right), {:.3g} s in "
+                  "all;\na full bar is {} {}, half of one zero, a dot nothing yet:",
+                  map.is_linear ? "force" : "torque", map.seconds(), output::number(largest, 3), torque_unit(map)));
+  console.line(fmt::format("{:>20}", fmt::format("velocity, {}", velocity_unit(map))));
   for (std::size_t v = map.velocity_bins(); v-- > 0;) {
     double ticks = 0.0, mean = 0.0;
     std::string bars;
@@ -52,19 +58,20 @@ void show(const ResidualMap& map, Console& console) {
       bars += glyph_of(bin, largest);
     }
     if (ticks == 0.0) continue;
-    console.line(fmt::format("{:>20}  {}  mean {:>10} N*m, {:.2g} s", text_of(map.velocity(v)), bars,
-                             output::number(mean / ticks, 3), ticks * map.tick_s));
+    console.line(fmt::format("{:>20}  {}  mean {:>10} {}, {:.2g} s", text_of(map.velocity(v)), bars,
+                             output::number(mean / ticks, 3), torque_unit(map), ticks * map.tick_s));
   }
 }
-std::string text_of(const MapFinding& f) {
+std::string text_of(const MapFinding& f, const ResidualMap& map) {
   const std::string p_value = f.p_value < 1e-12 ? "p below 1e-12" : fmt::format("p = {:.1g}", f.p_value);
-  const std::string what =
-      f.order == 0 ? fmt::format("a torque of {} N*m at {} rad/s", output::number(f.size_nm, 3), text_of(f.velocity))
-                   : fmt::format("a torque of order {} of the motor's turn, amplitude {} N*m", f.order,
-                                 output::number(f.size_nm, 3));
+  const char* const effort = map.is_linear ? "force" : "torque";
+  const std::string what = f.order == 0 ? fmt::format("a {} of {} {} at {} {}", effort, output::number(f.size_nm, 3),
+                                                      torque_unit(map), text_of(f.velocity), velocity_unit(map))
+                                        : fmt::format("a {} of order {} of the motor's turn, amplitude {} {}", effort,
+                                                      f.order, output::number(f.size_nm, 3), torque_unit(map));
   return fmt::format("{} +- {}; {}, corrected for the number of tests", what, output::number(f.std_nm, 2), p_value);
 }
-void print(const drive::MapTest& j, double limit_nm, Console& console) {
+void print(const drive::MapTest& j, const ResidualMap& map, double limit_nm, Console& console) {
   switch (j.verdict) {
     case MapVerdict::too_little_data:
       return console.line(
@@ -72,11 +79,11 @@ void print(const drive::MapTest& j, double limit_nm, Console& console) {
           "--compensate), then read it again.");
     case MapVerdict::model_fits:
       return console.line(console.good("The model fits") +
-                          fmt::format(": nothing certain above {} N*m at the {} velocities that were seen.",
-                                      output::number(limit_nm, 3), j.tested_bins));
+                          fmt::format(": nothing certain above {} {} at the {} velocities that were seen.",
+                                      output::number(limit_nm, 3), torque_unit(map), j.tested_bins));
     case MapVerdict::model_fails:
       console.line(console.bad("The model fails") + " here:");
-      for (const MapFinding& f : j.findings) console.line("  " + text_of(f));
+      for (const MapFinding& f : j.findings) console.line("  " + text_of(f, map));
   }
 }
 
@@ -100,7 +107,7 @@ int run_residual_map(const MonitorOptions& options, Console& console) {
         "The residual map was not recorded before (first reading, or a new block). Recording starts now; read it again "
         "after some motion.");
   show(map, console);
-  print(test, limit_nm, console);
+  print(test, map, limit_nm, console);
   if (options.reset) {
     drive::reset_residual_map(session, signer);
     console.line("The residual map is empty again.");

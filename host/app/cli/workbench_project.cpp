@@ -47,6 +47,7 @@ Request request_of(const std::vector<fs::path>& files, const workbench::Choices&
   request.gear_ratio = choices.gear_ratio;
   request.torque_constant_nm_a = choices.torque_constant_nm_a;
   request.encoder_counts = choices.encoder_counts;
+  request.pitch_m = choices.pitch_m;
   return request;
 }
 
@@ -178,6 +179,7 @@ json outlook(Draft& draft, const Request& request) {
     // The facts in the files themselves, too.
     answer["gear_ratio"] = output::json_number(project.dataset.drive.gear_ratio);
     answer["torque_constant_nm_a"] = output::json_number(project.dataset.drive.torque_constant_nm_a);
+    answer["pitch_m"] = output::json_number(project.dataset.drive.pitch_m);
   } catch (const data::DataError& unusable) {
     for (const data::Finding& f : unusable.findings())
       if (f.severity == data::Severity::error) answer["findings"].push_back(finding_json(f));
@@ -211,7 +213,7 @@ json propose(const std::vector<fs::path>& files, const workbench::Choices& choic
                    {"encoder_counts", number_of(draft.toml.defaults, "encoder_counts")},
                    {"notes", draft.notes},
                    {"has_dataset_toml", draft.from_toml}});
-  for (const char* fact : {"gear_ratio", "torque_constant_nm_a"})
+  for (const char* fact : {"gear_ratio", "torque_constant_nm_a", "pitch_m"})
     if (!proposal.contains(fact)) proposal[fact] = number_of(draft.toml.drive, fact);
   return proposal;
 }

@@ -119,7 +119,7 @@ void write_page(const std::filesystem::path& file, const Comparison& c) {
   document["good"] =
       c.runs.back().outcome.fault.empty() && c.runs.back().outcome.rms_error_rad < c.runs.front().outcome.rms_error_rad;
   document["tool_version"] = report::kToolVersion;
-  document["created"] = fmt::format("{:%Y-%m-%d}", fmt::localtime(std::time(nullptr)));
+  document["created"] = fmt::format("{:%Y-%m-%d %H:%M UTC}", fmt::gmtime(std::time(nullptr)));
   document["traces"] = traces_json(c);
   model::save(file, report::page(document, report::Script::closed_loop));
 }

@@ -338,9 +338,15 @@ bool Api::act_on_drive(const std::shared_ptr<Session>& session, const std::strin
     session->set("flash_preview", nullptr);
   } else if (what == "preview-flash" || what == "preview-restore") {
     session->start("Comparing with the drive", [this, what, session = session.get()](const Progress& progress) {
+      if (what == "preview-restore") return session->set("flash_preview", drive_.preview_restore());
       const std::shared_ptr<Step> step = session->history().current();
-      session->set("flash_preview",
-                   what == "preview-flash" ? drive_.preview_flash(step->model, progress) : drive_.preview_restore());
+      ComparedBlocks blocks;
+      json preview = drive_.preview_flash(step->model, progress, &blocks);
+      session->set("flash_preview", preview);
+      if (!setup_.run || blocks.made == blocks.active) return;
+      preview["predicted"] = predicted_gain(step->model, blocks, setup_.run, progress);
+      progress("");
+      session->set("flash_preview", std::move(preview));
     });
   } else if (what == "dismiss-preview") {
     session->set("flash_preview", nullptr);

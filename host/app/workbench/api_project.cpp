@@ -92,6 +92,7 @@ Choices with_facts_of(const Session& session, Choices choices) {
   if (!choices.gear_ratio) choices.gear_ratio = drive.gear_ratio.value;
   if (!choices.torque_constant_nm_a) choices.torque_constant_nm_a = drive.torque_constant_nm_a.value;
   if (choices.axis.empty() && drive.axis == data::Axis::linear) choices.axis = "linear";
+  if (!choices.pitch_m && drive.axis == data::Axis::linear) choices.pitch_m = drive.pitch_m.value;
   return choices;
 }
 

@@ -8,13 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "host/app/closed_loop/flash_gain.hpp"
 #include "host/drive_link/deployment/bases.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline::workbench {
 namespace {
 
-constexpr int kDraws = 8;
+constexpr int kDraws = 8, kDrawsOfFlash = 4;  // the latter as `flexspline flash`
 // Peak over rated current where it is not given: few servo drives allow less.
 constexpr double kPeakCurrent = 1.6;
 
@@ -111,6 +112,22 @@ nlohmann::json closed_loop_json(const closed_loop::Comparison& comparison, const
   answer["plant"] = plant_setup.what;
   answer["is_model"] = is_model;
   return answer;
+}
+
+nlohmann::json predicted_gain(const model::Model& model, const ComparedBlocks& blocks, const closed_loop::Runner& run,
+                              const Progress& progress) {
+  progress("predicting the gain");
+  const closed_loop::Runner in_steps =
+      closed_loop::in_groups(run, std::max(1U, std::thread::hardware_concurrency()),
+                             [&](std::size_t done) { progress(fmt::format("predicting the gain: run {}", done + 1)); });
+  try {
+    const auto found = closed_loop::predict_flash_gain(model, blocks.made, blocks.active, kDrawsOfFlash, in_steps);
+    nlohmann::json answer = closed_loop::flash_gain_json(found);
+    answer["in_words"] = closed_loop::flash_gain_in_words(found, model.drive.axis);
+    return answer;
+  } catch (const std::runtime_error& impossible) {
+    return {{"problem", impossible.what()}};
+  }
 }
 
 }  // namespace flexspline::workbench

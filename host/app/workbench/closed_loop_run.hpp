@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/app/closed_loop/compare.hpp"
+#include "host/app/workbench/block_comparison.hpp"
 #include "host/app/workbench/session.hpp"
 
 namespace flexspline::workbench {
@@ -40,5 +41,9 @@ closed_loop::Comparison run_closed_loop(const Step& first, const Step& now, Simu
 // The result: "flexspline-hil/1" with "plant" (what was simulated) and "is_model" (it was the present model).
 nlohmann::json closed_loop_json(const closed_loop::Comparison& comparison, const SimulatedPlant& plant_setup,
                                 bool is_model);
+
+// What `flexspline flash` predicts of the gain of a model on a drive, with "in_words"; {"problem"} where it cannot.
+nlohmann::json predicted_gain(const model::Model& model, const ComparedBlocks& blocks, const closed_loop::Runner& run,
+                              const Progress& progress);
 
 }  // namespace flexspline::workbench

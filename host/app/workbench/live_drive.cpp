@@ -8,7 +8,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host/drive_link/drive/block_changes.hpp"
 #include "host/drive_link/drive/model_block.hpp"
 #include "host/drive_link/drive/residual_map_json.hpp"
 #include "host/output/answers/json.hpp"
@@ -30,29 +29,6 @@ constexpr auto kSilence = std::chrono::seconds(5);
 
 const std::vector<Channel> kChannels{Channel::velocity,           Channel::current,        Channel::torque,
                                      Channel::feedforward_torque, Channel::command_torque, Channel::disturbance};
-
-json view_json(const drive::BlockView& view) {
-  if (view.bytes == 0) return nullptr;
-  return {{"model", view.model}, {"bytes", view.bytes}, {"sha256", view.sha256}};
-}
-
-json changes_json(const std::vector<drive::BlockChange>& changes) {
-  json list = json::array();
-  for (const drive::BlockChange& c : changes)
-    list.push_back({{"effect", c.effect},
-                    {"change", c.what},
-                    {"parameter", c.parameter},
-                    {"before", output::json_number(c.before)},
-                    {"after", output::json_number(c.after)},
-                    {"unit", c.unit}});
-  return list;
-}
-
-json comparison_json(const drive::Bytes& before, const drive::Bytes& after) {
-  return {{"before", view_json(drive::view_of(before))},
-          {"after", view_json(drive::view_of(after))},
-          {"changes", changes_json(drive::changes(before, after))}};
-}
 
 // A drive or a model may have changed while its user read the preview.
 void require_shown(const std::optional<PreviewedBlocks>& shown, const drive::Bytes& before, const drive::Bytes& after) {
@@ -251,7 +227,8 @@ json LiveDrive::drive_status() const {
   return answer;
 }
 
-json LiveDrive::preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress) {
+json LiveDrive::preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress,
+                              ComparedBlocks* compared) {
   const PriorityLock turn(mutex_, waiting_);
   require();
   return noticing_losses([&]() -> json {
@@ -261,6 +238,7 @@ json LiveDrive::preview_flash(const model::Model& model, const std::function<voi
     json preview = comparison_json(active_, made.bytes);
     preview["warnings"] = made.warnings;
     preview["restores"] = false;
+    if (compared != nullptr) *compared = {active_, made.bytes};
     return preview;
   });
 }
@@ -427,7 +405,8 @@ json LiveDrive::live(std::uint64_t since) {
   asked_ = Clock::now();
   json channels = json::array(), samples = json::array();
   for (const Channel c : kChannels)
-    channels.push_back({{"name", protocol::text_of(c).name}, {"unit", protocol::text_of(c).unit}});
+    channels.push_back(
+        {{"name", protocol::text_of(c).name}, {"unit", scales_ ? scales_->unit(c) : protocol::text_of(c).unit}});
   const std::uint64_t oldest = count_ - samples_.size();
   for (std::uint64_t k = std::max(since, oldest); k < count_; ++k) {
     const Sample& s = samples_[static_cast<std::size_t>(k - oldest)];
@@ -491,9 +470,8 @@ void LiveDrive::listen() {
     } catch (const std::exception& error) {
       lose(error.what());
     }
-    const bool busy = wanted;
     if (lock.owns_lock()) lock.unlock();
-    std::this_thread::sleep_for(busy ? std::chrono::milliseconds(2) : std::chrono::milliseconds(30));
+    std::this_thread::sleep_for(wanted ? std::chrono::milliseconds(2) : std::chrono::milliseconds(30));
   }
 }
 

@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "host/app/workbench/block_comparison.hpp"
 #include "host/drive_link/drive/pairing.hpp"
 #include "host/drive_link/drive/recorder.hpp"
 #include "host/drive_link/drive/scales.hpp"
@@ -56,7 +57,8 @@ class LiveDrive {
   nlohmann::json in_reach() const;
 
   // {"before", "after", "changes", "warnings", "restores"}: the effect of the next two functions. Changes nothing.
-  nlohmann::json preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress);
+  nlohmann::json preview_flash(const model::Model& model, const std::function<void(std::string_view)>& progress,
+                               ComparedBlocks* compared = nullptr);
   nlohmann::json preview_restore();
   // {"before", "after", "changes", "warnings", "flashed"} as `flexspline flash` reports it. Throws as it does, and
   // DriveError where the blocks are not those that were shown.

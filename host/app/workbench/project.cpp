@@ -66,6 +66,7 @@ Choices choices_of(const json& body) {
   choices.gear_ratio = positive(given, "gear_ratio");
   choices.torque_constant_nm_a = positive(given, "torque_constant_nm_a");
   choices.encoder_counts = positive(given, "encoder_counts");
+  choices.pitch_m = positive(given, "pitch_m");
   return choices;
 }
 

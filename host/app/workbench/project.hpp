@@ -20,7 +20,7 @@ struct Choices {
   std::vector<std::string> turned;   // columns of ours whose sign is the other one
   std::string axis, position_side;
   std::optional<int> joint, pole_pairs;
-  std::optional<double> gear_ratio, torque_constant_nm_a, encoder_counts;
+  std::optional<double> gear_ratio, torque_constant_nm_a, encoder_counts, pitch_m;
   std::vector<std::string> tolerate;
 };
 

@@ -16,21 +16,24 @@ PositionMotion::PositionMotion(const planning::Run& run, const planning::Limits&
     : scales_(scales), points_(planning::set_points(run, kStep_s)), velocity_limit_(limits.velocity_rad_s) {
   if (points_.empty()) points_.push_back(0.0);
   const auto [low, high] = std::minmax_element(points_.begin(), points_.end());
+  const bool is_linear = scales.is_linear();
+  const char* const unit = is_linear ? "m" : "rad";
+  const char* const of_motor = is_linear ? "metres" : "radians of the motor";
   const double travel = (std::max(*high, 0.0) - std::min(*low, 0.0)) / scales.constants.gear_ratio;
   if (limits.travel_rad > 0.0 && travel > 1.001 * limits.travel_rad)
     throw planning::PlanError(
-        fmt::format("run \"{}\": it turns the output by {:.4g} rad, beyond the plan's limit of {:g} rad; lower its "
-                    "amplitude or offset (radians of the motor)",
-                    run.name, travel, limits.travel_rad));
+        fmt::format("run \"{}\": it {} the output by {:.4g} {}, beyond the plan's limit of {:g} {}; lower its "
+                    "amplitude or offset ({})",
+                    run.name, is_linear ? "moves" : "turns", travel, unit, limits.travel_rad, unit, of_motor));
   if (run.waveform == planning::Waveform::square || limits.velocity_rad_s <= 0.0) return;
   double fastest = 0.0;
   for (std::size_t i = 1; i < points_.size(); ++i)
     fastest = std::max(fastest, std::abs(points_[i] - points_[i - 1]) / kStep_s);
   if (fastest > 1.001 * limits.velocity_rad_s)
     throw planning::PlanError(
-        fmt::format("run \"{}\": its set point moves at up to {:.4g} rad/s, beyond the plan's limit of {:g}; lower its "
-                    "amplitude (radians of the motor) or frequency",
-                    run.name, fastest, limits.velocity_rad_s));
+        fmt::format("run \"{}\": its set point moves at up to {:.4g} {}/s, beyond the plan's limit of {:g}; lower its "
+                    "amplitude ({}) or frequency",
+                    run.name, fastest, unit, limits.velocity_rad_s, of_motor));
 }
 
 protocol::Command PositionMotion::arm(bool compensate) const {

@@ -127,6 +127,7 @@ double ResidualMap::seconds() const {
 ResidualMap read_residual_map(Session& session, const Scales& scales) {
   const protocol::MapInfo info = info_of(session);
   ResidualMap map;
+  map.is_linear = scales.is_linear();
   map.counts = info.counts;
   map.tick_s = static_cast<double>(control::ResidualMap::kEveryTicks) / session.identity().tick_hz;
   map.angle_bins = info.angle_bins;

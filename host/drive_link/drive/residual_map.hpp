@@ -17,6 +17,7 @@ struct ResidualBin {
   double std_nm = 0.0;   // of single ticks
 };
 struct ResidualMap {
+  bool is_linear = false;           // an axis in m/s and N
   bool counts = false;              // it grows while it is read
   bool of_one_moment = false;       // nothing was counted between its first and its last bin
   double tick_s = 0.0;              // from one residual that is counted to the next

@@ -42,15 +42,11 @@ json map_json(const ResidualMap& map, const MapTest& test, double limit_nm) {
                         {"size_nm", f.size_nm},
                         {"std_nm", f.std_nm},
                         {"p_value", f.p_value}});
-  return {{"unit", "N*m"},
-          {"of_one_moment", map.of_one_moment},
-          {"seconds", map.seconds()},
-          {"angle_bins", map.angle_bins},
-          {"rows", std::move(rows)},
-          {"verdict", name_of(test.verdict)},
-          {"limit_nm", limit_nm},
-          {"judged_velocities", test.tested_bins},
-          {"findings", std::move(findings)}};
+  return {{"unit", map.is_linear ? "N" : "N*m"},   {"velocity_unit", map.is_linear ? "m/s" : "rad/s"},
+          {"of_one_moment", map.of_one_moment},    {"seconds", map.seconds()},
+          {"angle_bins", map.angle_bins},          {"rows", std::move(rows)},
+          {"verdict", name_of(test.verdict)},      {"limit_nm", limit_nm},
+          {"judged_velocities", test.tested_bins}, {"findings", std::move(findings)}};
 }
 
 }  // namespace flexspline::drive

@@ -11,9 +11,9 @@ namespace flexspline::drive {
 // A share of the motor's torque limit that no compensation is better than: what is smaller is no finding, N m.
 double usual_map_limit_nm(const Scales& scales);
 
-// {"unit", "of_one_moment", "seconds", "angle_bins", "rows": [{"velocity_rad_s": [low, high], "ticks", "mean_nm",
-// "std_nm"}], "verdict", "limit_nm", "judged_velocities", "findings": [{"order", "velocity_rad_s", "size_nm",
-// "std_nm", "p_value"}]}; ends at infinity and means of empty bins are null.
+// {"unit", "velocity_unit", "of_one_moment", "seconds", "angle_bins", "rows": [{"velocity_rad_s": [low, high], "ticks",
+// "mean_nm", "std_nm"}], "verdict", "limit_nm", "judged_velocities", "findings": [{"order", "velocity_rad_s",
+// "size_nm", "std_nm", "p_value"}]}; ends at infinity and means of empty bins are null.
 nlohmann::json map_json(const ResidualMap& map, const MapTest& test, double limit_nm);
 
 }  // namespace flexspline::drive

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host/drive_link/deployment/bases.hpp"
 #include "shared/fixed/turn.hpp"
@@ -38,6 +39,15 @@ double Scales::value(protocol::Channel channel, std::uint32_t word) const {
       return part * constants.torsion_base;
   }
   return 0.0;
+}
+
+std::string_view Scales::unit(protocol::Channel channel) const {
+  constexpr std::pair<std::string_view, std::string_view> kLinear[] = {
+      {"rad", "m"}, {"rad/s", "m/s"}, {"rad/s^2", "m/s^2"}, {"N*m", "N"}};
+  const std::string_view rotary = protocol::text_of(channel).unit;
+  for (const auto& [unit, linear] : kLinear)
+    if (is_linear() && rotary == unit) return linear;
+  return rotary;
 }
 
 std::int32_t Scales::per_unit(double value, double base) const {

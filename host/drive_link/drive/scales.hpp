@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "host/drive_link/drive/session.hpp"
 #include "shared/effects/effect.hpp"
@@ -17,6 +18,8 @@ struct Scales {
 
   // A channel's word in its unit (protocol::kChannelTexts). Whole turns and fractions of them are both in turns.
   double value(protocol::Channel channel, std::uint32_t word) const;
+  // That unit, on a linear axis m, m/s and N in place of rad, rad/s and N m.
+  std::string_view unit(protocol::Channel channel) const;
   std::int32_t per_unit(double value, double base) const;  // limited to two bases
   // Positions of both shafts for a turn: rad, m on a linear axis.
   double turn() const;

@@ -205,6 +205,13 @@ void store_grids(model::Model& model, const Term& term, data::Axis axis) {
   }
 }
 
+// What a model states of an error: half of the 95 % interval in standard errors. It counts the biases as the interval
+// does, because whoever reads a model (an opened model's interval, drives drawn for a prediction) has nothing else.
+std::optional<double> stated_std(const Estimate& e) {
+  if (!e.std || !e.low || !e.high) return e.std;
+  return 0.5 * (*e.high - *e.low) / half_width_under_bias(0.0);
+}
+
 }  // namespace
 
 void store(model::Model& model, const std::vector<Estimate>& estimates) {
@@ -214,7 +221,7 @@ void store(model::Model& model, const std::vector<Estimate>& estimates) {
     if (!p || e.fixed) continue;
     p->value = e.value;
     p->unit = e.unit;
-    p->std = e.std;
+    p->std = stated_std(e);
     p->spread_percent = e.spread_percent;
   }
 }

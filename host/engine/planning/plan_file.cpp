@@ -37,14 +37,18 @@ std::string number(double value) {
 
 // Of a key's number, for messages.
 std::string_view unit_of(std::string_view key) {
-  constexpr std::pair<std::string_view, std::string_view> kEnds[] = {
-      {"_rad_s", "in rad/s"}, {"_hz", "in Hz"}, {"_nm", "in N*m"}, {"_rad", "in rad"},
-      {"_s", "in s"},         {"_a", "in A"},   {"_c", "in degC"}};
+  constexpr std::pair<std::string_view, std::string_view> kEnds[] = {{"_rad_s", "in rad/s (linear axis: m/s)"},
+                                                                     {"_hz", "in Hz"},
+                                                                     {"_nm", "in N*m (linear axis: N)"},
+                                                                     {"_rad", "in rad (linear axis: m)"},
+                                                                     {"_s", "in s"},
+                                                                     {"_a", "in A"},
+                                                                     {"_c", "in degC"}};
   for (const auto& [end, unit] : kEnds)
     if (key.ends_with(end)) return unit;
   if (key == "slope_limit") return "in the unit of the amplitude per second";
   if (key == "amplitude" || key == "offset")
-    return "in A (mode current), rad/s (velocity) or rad (position) at the motor";
+    return "in A (mode current), rad/s (velocity) or rad (position) at the motor; on a linear axis m/s or m";
   return "as the plan's description states";
 }
 

@@ -33,6 +33,19 @@ std::string label(const NamedEffect& named) {
 
 }  // namespace
 
+void StepwiseSelection::note_added(const NamedEffect& effect) {
+  std::erase(removed, label(effect));
+  kept.push_back(effect);
+}
+
+bool StepwiseSelection::note_removed(const std::string& name) {
+  std::erase_if(kept, [&](const NamedEffect& effect) { return label(effect) == name; });
+  removed.push_back(name);
+  const bool again = std::ranges::find(ever_removed_, name) != ever_removed_.end();
+  ever_removed_.push_back(name);
+  return again;
+}
+
 std::string least_significant_effect(const data::Dataset& dataset, const model::Model& model,
                                      const std::vector<std::string>& ids, const Options& options) {
   const auto fitted = estimation::identify(dataset, model, options.pipeline);
@@ -84,23 +97,22 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
     if (progress) progress(result.rounds.back());
     if (!more) return result;
     if (options.progress) options.progress("adding it");
-    result.model = add(dataset, result.model, label(result.rounds.back().named.front()), options.pipeline).model;
+    const NamedEffect newest = result.rounds.back().named.front();
+    result.model = add(dataset, result.model, label(newest), options.pipeline).model;
+    result.note_added(newest);
     // The newest was just named with the others in the model; only those are tried.
     const std::vector<std::string> before = added;
     const Diagnosis& last = result.rounds.back();
     if (!last.candidates.empty() && last.candidates.front().score > kPolicy.named_score) {
       added.push_back(result.model.effects.back().id);
-      label_of[added.back()] = label(last.named.front());
+      label_of[added.back()] = label(newest);
     }
     if (before.empty()) continue;
     const std::string out = least_significant_effect(dataset, result.model, before, options);
     if (out.empty()) continue;
     result.model = remove(dataset, result.model, out, options.pipeline).model;
     std::erase(added, out);
-    // It was named before and removed as least_significant_effect. Naming it again would be an endless loop.
-    const bool again = std::find(result.removed.begin(), result.removed.end(), label_of[out]) != result.removed.end();
-    if (again) return result;
-    result.removed.push_back(label_of[out]);
+    if (result.note_removed(label_of[out])) return result;
   }
 }
 

@@ -12,8 +12,16 @@ struct StepwiseSelection {
   // The result of diagnose() for the model of that round. The effect that a round names is in the model of the next;
   // the last round names what is not worth adding, or nothing.
   std::vector<Diagnosis> rounds;
-  std::vector<std::string> removed;  // as named: effects that were added and no longer reduce the error
+  std::vector<NamedEffect> kept;     // in the model: added, and not removed since
+  std::vector<std::string> removed;  // as named: effects that were added, no longer reduce the error, and are not kept
   model::Model model;                // with what was added, refitted
+
+  void note_added(const NamedEffect& effect);
+  // Returns whether it was removed before: naming it again would be an endless loop.
+  bool note_removed(const std::string& label);
+
+ private:
+  std::vector<std::string> ever_removed_;
 };
 
 // Adds the effects that diagnose() names. Stops where it names none, or a group that cannot be distinguished; where the

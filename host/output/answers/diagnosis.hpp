@@ -24,9 +24,9 @@ std::string verdict_in_words(const selection::Diagnosis& found);
 // goes.
 void print_diagnosis(Console& console, const selection::Diagnosis& found, const std::string& add_command);
 
-// "flexspline-diagnose/1". With more than one round, `named` holds all that were added and not removed again.
+// "flexspline-diagnose/1". With more than one round, `named` is `kept`: all that were added and not removed since.
 nlohmann::json diagnosis_json(const selection::Diagnosis& found);
 nlohmann::json rounds_json(const std::vector<selection::Diagnosis>& rounds,
-                           const std::vector<std::string>& removed = {});
+                           const std::vector<selection::NamedEffect>& kept);
 
 }  // namespace flexspline::output

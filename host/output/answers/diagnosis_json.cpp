@@ -208,23 +208,13 @@ json diagnosis_json(const Diagnosis& d) {
           {"rounds", json::array()}};
 }
 
-json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<std::string>& removed) {
+json rounds_json(const std::vector<Diagnosis>& rounds, const std::vector<selection::NamedEffect>& kept) {
   json result = diagnosis_json(rounds.front());
-  std::vector<selection::NamedEffect> all;
-  for (const Diagnosis& d : rounds) {
-    // Of each round the first name was added; the last one ends the search, and adds nothing.
-    if (rounds.size() == 1)
-      all = d.named;
-    else if (&d != &rounds.back())
-      all.push_back(d.named.front());
-    result["rounds"].push_back(diagnosis_json(d));
-  }
-  std::erase_if(all, [&](const selection::NamedEffect& n) {
-    return std::find(removed.begin(), removed.end(), effect_label(n.effect, n.order)) != removed.end();
-  });
-  if (rounds.size() > 1) result["named"] = named_json(all);
+  for (const Diagnosis& d : rounds) result["rounds"].push_back(diagnosis_json(d));
+  if (rounds.size() == 1) return result;
+  result["named"] = named_json(kept);
   // The first round's verdict is of an effect that was removed again.
-  if (rounds.size() > 1 && all.empty()) result["verdict"] = result["rounds"].back()["verdict"];
+  if (kept.empty()) result["verdict"] = result["rounds"].back()["verdict"];
   return result;
 }
 

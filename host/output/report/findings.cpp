@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/output/answers/diagnosis.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
@@ -17,7 +18,6 @@ using output::json_number;
 
 // Up to here an error is called that of the noise (see comparison/README.md and the verdict at_noise_floor).
 constexpr double kAtNoise = 1.3;
-constexpr double kTwoSided95 = 1.96;
 
 json parameter_json(const estimation::Estimate& e) {
   json parameter = output::json_parameter(e);
@@ -159,8 +159,9 @@ json parameters(const Subject& subject, const View& view) {
       e.value = *p.value;
       e.std = p.std;
       if (p.std) {
-        e.low = *p.value - kTwoSided95 * *p.std;
-        e.high = *p.value + kTwoSided95 * *p.std;
+        const estimation::Interval interval = estimation::interval_95(*p.value, *p.std);
+        e.low = interval.low;
+        e.high = interval.high;
       }
       e.spread_percent = p.spread_percent;
       // The file does not say of how many experiments the spread is, so a small one is no verdict.

@@ -42,7 +42,7 @@ export interface Flash {
   before: BlockView | null; after: BlockView | null; warnings: string[]; flashed: boolean; drive: string; changes: BlockChange[];
 }
 // What a flash, or going back, would change; nothing is done before it is confirmed.
-export interface FlashPreview extends Flash { restores: boolean }
+export interface FlashPreview extends Flash { restores: boolean; predicted?: { in_words?: string; problem?: string; stable?: boolean } }
 export interface State {
   changes: number; data_name: string; model_name: string; model_file: string; folder: string; experiments: Experiment[]; balances: Balance[];
   warnings: string[]; steps: Step[]; at: number; parameters: Parameter[]; diagnosis: Diagnosis | null;
@@ -61,7 +61,7 @@ export interface ProposedColumn {
 export interface Proposal {
   files: string[]; columns: ProposedColumn[]; adds: boolean;
   signals: { name: string; unit: string; low?: (number | null)[]; high?: (number | null)[]; least?: number | null; largest?: number | null }[];
-  axis: string; position_side: string; question: string; joints: number[]; joint: number | null; needs_pole_pairs: string; gear_ratio: number | null; torque_constant_nm_a: number | null;
+  axis: string; position_side: string; question: string; joints: number[]; joint: number | null; needs_pole_pairs: string; gear_ratio: number | null; torque_constant_nm_a: number | null; pitch_m: number | null;
   encoder_counts: number | null; notes: string[]; warnings: string[]; effects: string[]; reasons: string[]; can_begin: boolean; why_not: string; has_dataset_toml: boolean;
   choices?: { page?: PageChoices } | null;
   findings: { file: string; line: number; column: string; what: string; remedy: string; tolerate: string | null }[];
@@ -116,7 +116,9 @@ export async function act(what: string, more: Record<string, unknown> = {}): Pro
 export async function sendFiles(files: File[]): Promise<void> {
   const form = new FormData();
   files.forEach((file, k) => form.append(`file${k}`, file, file.name));
-  await answer(await fetch(address("drop"), { method: "POST", body: form }));
+  // The browser gives no reason.
+  const response = await fetch(address("drop"), { method: "POST", body: form }).catch(() => { throw new Error(`${files.map((f) => f.name).slice(0, 3).join(", ")}: not sent. Check that the files are still there and may be read, and that the workbench runs; then drop them again.`); });
+  await answer(response);
 }
 
 // A link to the file would show a refusal in place of the page.

@@ -35,7 +35,8 @@ for (const end of ["pointerup", "pointercancel", "dragend"])
     for (const [element, children] of all) fill(element, ...children);
   }), { capture: true });
 
-// Puts new content into an element; what had the focus has it again where it has a key (data-key).
+// Puts new content into an element; what had the focus has it again where it has a key (data-key), and a list with a key
+// stays open or closed.
 export function fill(element: HTMLElement, ...children: Child[]): void {
   if (held && held !== element && element.contains(held)) {
     late.set(element, children);
@@ -44,8 +45,13 @@ export function fill(element: HTMLElement, ...children: Child[]): void {
   late.delete(element);
   const focused = element.contains(document.activeElement) ? (document.activeElement as HTMLElement).dataset.key : undefined;
   const scrolled = Array.from(element.querySelectorAll<HTMLElement>("[data-scroll]")).map((e) => [e.dataset.scroll, e.scrollTop] as const);
+  const lists = Array.from(element.querySelectorAll<HTMLDetailsElement>("details[data-key]")).map((e) => [e.dataset.key ?? "", e.open] as const);
   element.replaceChildren();
   append(element, children);
+  for (const [key, open] of lists) {
+    const again = element.querySelector<HTMLDetailsElement>(`details[data-key="${CSS.escape(key)}"]`);
+    if (again) again.open = open;
+  }
   for (const [key, top] of scrolled) {
     const again = element.querySelector<HTMLElement>(`[data-scroll="${key}"]`);
     if (again) again.scrollTop = top;

@@ -1,6 +1,6 @@
 // The drive: connect, flash, go back, and its signals live.
 import type uPlot from "uplot";
-import { get, type BlockChange, type BlockView, type State } from "./api";
+import { get, type BlockChange, type BlockView, type FlashPreview, type State } from "./api";
 import { announce, button, el, fill, num, relative, unit, words } from "./dom";
 import { MapPanel } from "./map";
 import { axes, Figure, line } from "./plots";
@@ -14,6 +14,14 @@ function changes(all: BlockChange[]): HTMLElement {
   const value = (c: BlockChange) => `${num(c.before, 5)} → ${num(c.after, 5)} ${unit(c.unit)}`;
   return el("ul", { class: "changes" }, changed.slice(0, 12).map((c) => el("li", {}, `${c.change} ${words(c.effect)}${c.parameter ? ` ${words(c.parameter)}: ${value(c)}` : ""}`, c.parameter ? el("span", { class: "soft" }, ` (${relative(c.before, c.after)})`) : null)),
     changed.length > 12 ? el("li", {}, `and ${changed.length - 12} more`) : null, changed.length ? null : el("li", {}, "nothing: the drive has these values already"));
+}
+
+// What the model is worth on this drive, as `flexspline flash` predicts it.
+function gain(p: FlashPreview): (HTMLElement | null)[] {
+  const found = p.predicted;
+  if (!found) return [];
+  if (found.problem) return [el("p", { class: "soft" }, `The gain cannot be predicted: ${found.problem}`)];
+  return [el("p", { "data-predicted": "" }, found.in_words ?? ""), found.stable === false ? el("p", { class: "high" }, "In the prediction the drive had a fault with this model.") : null];
 }
 
 export class DrivePanel {
@@ -105,7 +113,7 @@ export class DrivePanel {
       s.came_back ? el("p", { class: "soft", "data-back": "" }, "It was lost and is connected again. Nothing was done to it meanwhile: check whether its block is the right one.") : null,
       p ? el("div", { class: "preview", "data-preview": p.restores ? "restore" : "flash" }, el("p", {}, el("strong", {}, p.restores ? "Going back would change:" : "Flashing would change:"), el("span", { class: "soft" }, ` ${p.before ? `“${p.before.model}”` : "no block"} → ${p.after ? `“${p.after.model}”` : "no block"}`)),
         el("div", { class: "row actions" }, button(p.restores ? "Go back" : "Flash it", () => this.run(p.restores ? "restore" : "flash", { before: p.before?.sha256 ?? "", after: p.after?.sha256 ?? "" }), { class: "main", disabled: off, "data-confirm": "" }), button("Leave it as it is", () => this.run("dismiss-preview"), { class: "quiet", disabled: off })),
-        changes(p.changes), p.warnings.map((w) => el("p", { class: "high" }, w))) : null,
+        changes(p.changes), gain(p), p.warnings.map((w) => el("p", { class: "high" }, w))) : null,
       f && !p ? el("div", { class: "done", "data-flashed": f.flashed ? "yes" : "no" }, el("p", {}, f.flashed ? "✓ flashed, read back and in use" : "The drive has this block already."), f.warnings.map((w) => el("p", { class: "high" }, w)),
         changes(f.changes)) : null);
   }

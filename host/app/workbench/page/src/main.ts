@@ -3,6 +3,7 @@ import { act, get, openTab, Refusal, sendFiles, type Problem, type State } from 
 import { Add } from "./add";
 import { NewProject } from "./new_project";
 import { announce, button, el, fill, fillOnce, words } from "./dom";
+import { droppedFiles, kEndings } from "./dropped";
 import { FitQuality } from "./fit_quality";
 import { Missing } from "./missing";
 import { redrawAll } from "./plots";
@@ -62,7 +63,7 @@ function header(s: State): void {
   fillOnce(warned, String(count), count ? button(`${count} warning${count > 1 ? "s" : ""}`, () => showMessages("Warnings", state?.warnings ?? []), { class: "quiet" }) : null);
 }
 
-const picker = el("input", { type: "file", multiple: true, accept: ".csv,.tsv,.txt,.dat,.asc,.log,.gz,.mat,.h5,.hdf5,.npz,.npy,.bag,.db3,.mcap", class: "unseen", "aria-label": "Add files", "data-key": "files" });
+const picker = el("input", { type: "file", multiple: true, accept: kEndings.join(","), class: "unseen", "aria-label": "Add files", "data-key": "files" });
 picker.addEventListener("change", () => { void send(Array.from(picker.files ?? [])); picker.value = ""; });
 function filePicker(): HTMLElement { return picker; }
 
@@ -189,7 +190,7 @@ function dropping(): void {
   fill(drop, el("p", {}, "Drop recordings here"));
   addEventListener("dragover", (e) => { e.preventDefault(); drop.hidden = false; });
   addEventListener("dragleave", (e) => { if (!e.relatedTarget) drop.hidden = true; });
-  addEventListener("drop", (e) => { e.preventDefault(); drop.hidden = true; void send(Array.from(e.dataTransfer?.files ?? [])); });
+  addEventListener("drop", (e) => { e.preventDefault(); drop.hidden = true; droppedFiles(e.dataTransfer).then(send, complain); });
 }
 
 async function begin(): Promise<void> {

@@ -13,9 +13,9 @@ const kLabels: Record<string, string> = {
 // Always shown; others where they have a source, or on request.
 const kMain = ["time_s", "current_a", "motor_torque_nm", "motor_position_rad", "motor_velocity_rad_s", "output_position_rad"];
 
-const kFacts: Record<string, string> = { gear_ratio: "Gear ratio", torque_constant_nm_a: "Torque constant", encoder_counts: "Encoder counts", pole_pairs: "Pole pairs" };
+const kFacts: Record<string, string> = { gear_ratio: "Gear ratio", pitch_m: "Pitch", torque_constant_nm_a: "Torque constant", encoder_counts: "Encoder counts", pole_pairs: "Pole pairs" };
 const kWhole = ["encoder_counts", "pole_pairs"];
-function numberOf(text: string | undefined): number { return Number((text ?? "").trim().replace(",", ".") || NaN); }
+function numberOf(text: string | undefined): number { return Number((text ?? "").trim() || NaN); }
 
 export class NewProject {
   private readonly body = el("div", { class: "begin" });
@@ -90,8 +90,8 @@ export class NewProject {
         el("thead", {}, el("tr", {}, ["signal", "column of the file", "unit", "sign", "as recorded", "from … to"].map((t) => el("th", { scope: "col" }, t)))),
         el("tbody", {}, rows.map((c) => this.row(p, c))))),
       el("div", { class: "row actions" }, this.showsAll ? null : button("Show all signals", () => { this.showsAll = true; if (this.state) this.render(this.state); }, { class: "quiet" })),
-      p.notes.length ? el("details", {}, el("summary", {}, `What was guessed or decided (${p.notes.length})`), el("ul", {}, p.notes.map((n) => el("li", {}, n)))) : null,
-      p.warnings.length ? el("details", { open: true }, el("summary", {}, `Warnings (${p.warnings.length})`), el("ul", {}, p.warnings.map((n) => el("li", {}, this.inPageWords(n))))) : null,
+      p.notes.length ? el("details", { "data-key": "notes" }, el("summary", { "data-key": "notes summary" }, `What was guessed or decided (${p.notes.length})`), el("ul", {}, p.notes.map((n) => el("li", {}, n.replace(/; give --pitch-m METRES, or write pitch_m under \[drive\]/, "; type it above"))))) : null,
+      p.warnings.length ? el("details", { open: true, "data-key": "warnings" }, el("summary", { "data-key": "warnings summary" }, `Warnings (${p.warnings.length})`), el("ul", {}, p.warnings.map((n) => el("li", {}, this.inPageWords(n))))) : null,
     ];
   }
 
@@ -124,6 +124,7 @@ export class NewProject {
     const side = String(this.facts["position_side"] ?? p.position_side ?? "");
     return el("div", { class: "facts" },
       p.axis === "linear" ? null : field("gear_ratio", "Gear ratio", "motor turns for one turn of the output", p.gear_ratio),
+      p.axis === "linear" ? field("pitch_m", "Pitch, m", "travel for one turn of the motor; empty for a linear motor", p.pitch_m) : null,
       p.axis === "linear" ? field("torque_constant_nm_a", "Force constant, N/A", "force of the motor for one ampere; without it forces come out in amperes", p.torque_constant_nm_a)
         : field("torque_constant_nm_a", "Torque constant, N·m/A", "torque of the motor for one ampere; without it torques come out in amperes", p.torque_constant_nm_a),
       side || p.question ? choice("position_side", "Position and velocity are of the", [["", "? (choose one)"], ["motor", "motor"], ["link", "link (output)"]].filter(([v]) => v || !side || side === "open") as [string, string][], side === "open" ? "" : side) : null,
@@ -188,7 +189,7 @@ export class NewProject {
     const page: PageChoices = { chosen: [...this.chosen], facts: { ...this.facts }, tolerated: [...this.tolerated], turned: [...this.turned], left: this.left };
     // What was mapped by hand is of the same side as what was guessed.
     const side = this.facts["position_side"] ?? (map.length && p?.position_side === "link" ? "link" : undefined);
-    return { map, without, turned: [...this.turned].filter((column) => p?.columns.some((c) => c.column === column && c.source !== null)), gear_ratio: number("gear_ratio"), torque_constant_nm_a: number("torque_constant_nm_a"), encoder_counts: number("encoder_counts"), joint: number("joint"), pole_pairs: number("pole_pairs"),
+    return { map, without, turned: [...this.turned].filter((column) => p?.columns.some((c) => c.column === column && c.source !== null)), gear_ratio: number("gear_ratio"), torque_constant_nm_a: number("torque_constant_nm_a"), encoder_counts: number("encoder_counts"), pitch_m: p?.axis === "linear" ? number("pitch_m") : undefined, joint: number("joint"), pole_pairs: number("pole_pairs"),
       position_side: side && side !== "open" ? side : undefined, tolerate: [...this.tolerated], page };
   }
   private left: string[] = [];
@@ -208,7 +209,9 @@ export class NewProject {
       const value = numberOf(this.facts[key]);
       return (this.facts[key] ?? "").trim() && !(value > 0 && Number.isFinite(value) && (!kWhole.includes(key) || Number.isInteger(value)));
     });
-    if (wrong) this.run("complain", { what: `${kFacts[wrong]}: “${this.facts[wrong]}” is not a ${kWhole.includes(wrong) ? "whole number" : "number"} above zero.` });
+    // A comma stands for thousands in one country, for the decimal point in the next.
+    const remedy = wrong && this.facts[wrong]?.includes(",") ? " Type it without a comma, as 1000 or 0.05." : "";
+    if (wrong) this.run("complain", { what: `${kFacts[wrong]}: “${this.facts[wrong]}” is not a ${kWhole.includes(wrong) ? "whole number" : "number"} above zero.${remedy}` });
     else this.run(what, { choices: this.choices() });
   }
 }
