@@ -9,7 +9,8 @@
 
 namespace flexspline::output {
 
-// On a linear axis "torque", "N m", "rad", "output angle" become "force", "N", "m", "output position". Names of columns, keys and options stay.
+// On a linear axis "torque", "N m", "rad", "output angle" become "force", "N", "m", "output position". Names of
+// columns, keys and options stay.
 std::string words_on(data::Axis axis, std::string_view text);
 // Of the axis whose balances are in this unit: "N*m", "N".
 data::Axis axis_of(std::string_view unit);
