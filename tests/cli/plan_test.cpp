@@ -66,6 +66,7 @@ TEST(PlanCommand, SaysWhatItAssumesAndProposesNoTemperaturesForAModelWithoutThem
     EXPECT_TRUE(run["temperature_c"].is_null()) << run;
   }
   const std::string notes = found["notes"].dump();
+  EXPECT_TRUE(contains(notes, "No effect of the model depends on the temperature")) << notes;
   EXPECT_EQ(contains(notes, "the output can be locked (--without locked)"), locked) << notes;
   EXPECT_FALSE(contains(shell.json(plan + " --with locked,free")["notes"].dump(), "the output can")) << notes;
   for (const nlohmann::json& run : shell.json(plan + " --without locked")["runs"]) EXPECT_EQ(run["load"], "free");
@@ -110,6 +111,22 @@ TEST(LinearAxis, HasForcesInTheTextsOfIdentifyCompareDiagnoseAndPlan) {
   const Answer far = shell.run("flexspline plan --model fitted.toml --current-a 9 --velocity-rad-s 1 --out plan.toml");
   EXPECT_EQ(far.code, 2);
   EXPECT_TRUE(contains(far.err, "--travel-rad, in m")) << far.err;
+}
+
+TEST(PlanCommand, ProposesTwoTemperaturesToDataWithoutThemOnlyWhereTheUserStatesThem) {
+  const Shell shell;
+  shell.write("logs/z.csv", linear_log(2.0, 5.3));
+  shell.must("flexspline new --from logs --out project --axis linear");
+  shell.must("flexspline identify project --model project/base-model.toml --out fitted.toml");
+  const std::string separate =
+      "flexspline plan project --model fitted.toml --run-s 4 --separate temperature_viscous,temperature_coulomb --out "
+      "plan.toml";
+  const nlohmann::json unheated = shell.json(separate);
+  EXPECT_TRUE(contains(unheated["notes"].dump(), "The data have no temperature_c")) << unheated["notes"];
+  EXPECT_TRUE(unheated["runs"].empty()) << unheated["runs"];
+  const nlohmann::json heated = shell.json(separate + " --temperatures 20,50");
+  EXPECT_FALSE(contains(heated["notes"].dump(), "no temperature_c")) << heated["notes"];
+  EXPECT_EQ(heated["runs"][0]["temperature_c"], 20.0) << heated["runs"];
 }
 
 TEST(CompareCommand, HasExperimentsInTheOrderOfTheData) {

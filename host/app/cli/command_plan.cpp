@@ -6,10 +6,12 @@
 #include "host/app/cli/command.hpp"
 #include "host/app/cli/common_options.hpp"
 #include "host/engine/planning/design.hpp"
+#include "host/engine/selection/add.hpp"
 #include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/plan.hpp"
 #include "host/output/answers/text.hpp"
+#include "host/physics/catalogue/user_defined_effect.hpp"
 
 namespace flexspline::cli {
 namespace {
@@ -81,6 +83,29 @@ planning::MotionSettings setting_of(const PlanOptions& options, const model::Mod
   return setting;
 }
 
+bool asks_for_temperatures(const PlanOptions& options) {
+  return !options.temperatures_c.empty() || is_in(options.with, "temperature");
+}
+
+// Why two temperatures are not proposed; empty where they may be, or where nobody expects them.
+std::string why_no_temperatures(const PlanOptions& options, const model::Model& model, const data::Dataset* dataset) {
+  const auto reads = [](const catalogue::Entry& entry) { return (entry.info->reads & effects::kTemperature) != 0; };
+  const bool depends = std::any_of(model.effects.begin(), model.effects.end(),
+                                   [&](const model::Effect& effect) { return reads(catalogue::entry_of(effect)); }) ||
+                       std::any_of(options.separate.begin(), options.separate.end(), [&](const std::string& name) {
+                         return reads(*selection::parse_effect(name).entry);
+                       });
+  const bool asked = asks_for_temperatures(options);
+  if (asked && !depends)
+    return "No effect of the model depends on the temperature: recordings at two temperatures are not proposed.";
+  if (depends && !asked && dataset && !dataset->has(data::Column::temperature) &&
+      !is_in(options.without, "temperature"))
+    return "The data have no temperature_c: recordings at two temperatures are not proposed. Where one can be "
+           "measured, "
+           "give --temperatures COLD,WARM.";
+  return {};
+}
+
 // What the plan takes for possible, or for impossible, that neither data nor options state.
 std::vector<std::string> assumptions(const PlanOptions& options, const planning::MotionSettings& setting,
                                      const model::Model& model, const data::Dataset* dataset,
@@ -112,6 +137,7 @@ std::vector<std::string> assumptions(const PlanOptions& options, const planning:
     notes.emplace_back(
         "All recordings have a locked output: motions of a free output are not proposed. Where it can move, give "
         "--with free.");
+  if (std::string why = why_no_temperatures(options, model, dataset); !why.empty()) notes.push_back(std::move(why));
   if (design.plan.runs.empty()) return notes;
   if (!design.effort_is_current)
     notes.push_back(output::words_on(
@@ -157,6 +183,8 @@ int run(const PlanOptions& options, Console& console) {
   request.pipeline = options.pipeline.options();
   request.setting = setting_of(options, file.model, request.dataset);
   request.sensors = planning::sensors_of(file.model, request.dataset);
+  // Who records at two temperatures measures them.
+  request.sensors.temperature = request.sensors.temperature || asks_for_temperatures(options);
   request.sample_s = sample_time(options, dataset ? &*dataset : nullptr, request.setting.run_s, console);
   request.most_motions = static_cast<std::size_t>(options.motions);
   request.progress = [&](std::string_view stage) { console.progress(stage); };
