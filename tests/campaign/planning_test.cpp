@@ -87,7 +87,7 @@ PlannedCase plan_and_record(const Pair& pair, bool first_is_true, std::uint64_t 
   // The drive gives more than its rated current for a while, and did so in these data.
   request.setting.limits.current_a = request.setting.locked_current_a = demo.drive.current_limit_a;
   request.setting.limits.load_torque_nm = 5.0;
-  request.sensors = planning::sensors_of(&dataset);
+  request.sensors = planning::sensors_of(base, &dataset);
   const planning::Design design = planning::discriminate(request, pair.first, pair.second);
   result.margin_before = design.before->worst();
   result.margin_after = design.after->worst();

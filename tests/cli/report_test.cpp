@@ -140,6 +140,14 @@ TEST_F(Report, WhereItCannotStandIsSaidBeforeTheWork) {
   EXPECT_TRUE(contains(folder.err, "this is a folder")) << folder.err;
 }
 
+TEST(EffectsCommand, SaysWhatTheReferenceVelocityIs) {
+  const Shell shell;
+  const std::string said = shell.must("flexspline effects power_law_friction");
+  EXPECT_TRUE(contains(said, "wref: rated_velocity_rad_s of the model's [drive], without it 1 rad/s")) << said;
+  EXPECT_TRUE(contains(said, "wref = 200 rad/s")) << said;
+  EXPECT_FALSE(contains(shell.must("flexspline effects viscous_friction"), "wref"));
+}
+
 TEST(EffectsCommand, DrawsACurveAndGivesItsPoints) {
   const Shell shell;
   const nlohmann::json answer = shell.json("flexspline effects viscous_friction");

@@ -237,19 +237,43 @@ TEST(Compare, TableLeavesWarningsToStandardError) {
   EXPECT_EQ(output::comparison_json(found)["warnings"].back(), "a warning of its own");
 }
 
-TEST(Compare, TableHasTheWorstExperimentFirstAndThreeRegionsInWords) {
+TEST(Compare, TableHasExperimentsInTheOrderOfTheDataThenTheWorstAndThreeRegionsInWords) {
   model::Model wrong = compared().model;
   *wrong.find("linear_stiffness")->find("stiffness")->value *= 1.2;
   const std::string text = output::comparison_table(compare(compared().dataset, wrong, {}));
   const auto locked = text.find("locked (hold-out)"), free = text.find("\nfree");
   ASSERT_NE(locked, std::string::npos);
   ASSERT_NE(free, std::string::npos);
-  EXPECT_LT(locked, free);
+  const auto& experiments = compared().dataset.experiments;
+  const auto index_of = [&](std::string_view name) {
+    return std::find_if(experiments.begin(), experiments.end(), [&](const auto& e) { return e.name == name; }) -
+           experiments.begin();
+  };
+  EXPECT_EQ(locked < free, index_of("locked") < index_of("free"));
+  EXPECT_NE(text.find("over its noise or else its signal: locked (hold-out)\n"), std::string::npos) << text;
   std::size_t sentences = 0;
   for (std::size_t at = text.find("  The "); at != std::string::npos; at = text.find("  The ", at + 1)) ++sentences;
   EXPECT_EQ(sentences, 3u);
   EXPECT_NE(text.find("times the noise"), std::string::npos);
   EXPECT_NE(text.find("The transmission balance at "), std::string::npos) << text;
+}
+
+TEST(Compare, ATemperatureThatHardlyChangesIsNotSplit) {
+  data::Dataset dataset = compared().dataset;
+  for (data::Experiment& e : dataset.experiments) {
+    std::vector<double>& temperature = e[data::Column::temperature];
+    temperature.resize(e.size());
+    for (std::size_t k = 0; k < e.size(); ++k)
+      temperature[k] = 31.0 + 0.05 * static_cast<double>(k) / static_cast<double>(e.size());
+  }
+  const auto over_temperature = [](const Comparison& c) {
+    return std::count_if(c.regions.begin(), c.regions.end(),
+                         [](const Region& r) { return r.variable == "temperature"; });
+  };
+  EXPECT_EQ(over_temperature(compare(dataset, compared().model, {})), 0);
+  for (data::Experiment& e : dataset.experiments)
+    for (double& t : e[data::Column::temperature]) t = 31.0 + 200.0 * (t - 31.0);
+  EXPECT_GT(over_temperature(compare(dataset, compared().model, {})), 0);
 }
 
 }  // namespace

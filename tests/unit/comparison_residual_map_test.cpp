@@ -133,6 +133,19 @@ TEST(ResidualMap, AConstantHasNoBins) {
   EXPECT_EQ(equal_count_bins(Eigen::VectorXd::Ones(50), 4).count(), 0u);
 }
 
+TEST(ResidualMap, NoBinIsNarrowerThanItsVariableAllows) {
+  Eigen::VectorXd x(1000);
+  // Half of the samples at one temperature, as of a drive that is warm.
+  for (Eigen::Index k = 0; k < 1000; ++k)
+    x[k] = k < 500 ? 20.0 + 0.02 * static_cast<double>(k) : 30.0 + 1e-4 * static_cast<double>(k);
+  const Bins bins = equal_count_bins(x, 24, 1.0);
+  ASSERT_GE(bins.count(), 2u);
+  for (std::size_t b = 0; b < bins.count(); ++b) EXPECT_GE(bins.edges[b + 1] - bins.edges[b], 1.0);
+  EXPECT_EQ(bins.edges.back(), x.maxCoeff());
+  EXPECT_EQ(std::count(bins.bin.begin(), bins.bin.end(), -1), 0);
+  EXPECT_EQ(equal_count_bins(x, 24, 6.0).count(), 0u);
+}
+
 TEST(ResidualMap, MotorAngleStaysWithinATurn) {
   for (const SampleVariable& v : sample_variables(*rows().motor, data::Axis::rotary)) {
     if (v.name != "motor_angle") continue;

@@ -9,6 +9,7 @@
 
 #include "hil/plant/excitation.hpp"
 #include "host/engine/planning/design.hpp"
+#include "host/engine/planning/rehearsed_motions.hpp"
 #include "host/physics/catalogue/constants.hpp"
 
 namespace flexspline::planning::planning_test {
@@ -173,6 +174,99 @@ TEST(Planning, StiffnessIsUnknownUntilTheOutputIsLocked) {
     ASSERT_TRUE(p.percent_after.has_value()) << p.id;
     EXPECT_LT(*p.percent_after, 20.0) << p.id;
   }
+}
+
+data::Experiment a_record(data::Load load, double force = 1.0) {
+  data::Experiment e;
+  e.load = load;
+  e.sample_s = 1e-3;
+  for (int k = 0; k < 100; ++k) {
+    e.time_s.push_back(1e-3 * k);
+    e[data::Column::motor_position].push_back(0.004 * k);
+    e[data::Column::motor_velocity].push_back(4.0);
+    e[data::Column::motor_torque].push_back(force);
+  }
+  return e;
+}
+
+bool any(const std::vector<Motion>& list, bool (*has)(const planning::Run&)) {
+  return std::any_of(list.begin(), list.end(),
+                     [&](const Motion& m) { return std::any_of(m.runs.begin(), m.runs.end(), has); });
+}
+
+TEST(Planning, WhereAllRecordsHaveALockedOutputNoMotionOfAFreeOneIsProposed) {
+  const model::Model m = a_drive();
+  data::Dataset dataset;
+  dataset.experiments = {a_record(data::Load::locked), a_record(data::Load::locked)};
+  MotionSettings setting = setting_of(m, &dataset);
+  setting.temperature = true;
+  const auto moves = [](const planning::Run& r) { return !r.locked && r.mode != Mode::off; };
+  EXPECT_FALSE(any(motions(setting), moves));
+  EXPECT_TRUE(any(motions(setting), [](const planning::Run& r) { return r.locked; }));
+  dataset.experiments.push_back(a_record(data::Load::free));
+  EXPECT_TRUE(any(motions(setting_of(m, &dataset)), moves));
+}
+
+TEST(Planning, ALockedOutputThatTheDataShowIsProposedWithoutAGearAsWell) {
+  model::Model m = a_drive();
+  m.drive.gear_ratio.value = 1.0;
+  data::Dataset dataset;
+  dataset.experiments = {a_record(data::Load::free)};
+  EXPECT_FALSE(setting_of(m, &dataset).locked);
+  dataset.experiments.push_back(a_record(data::Load::locked));
+  EXPECT_TRUE(setting_of(m, &dataset).locked);
+}
+
+TEST(Planning, TwoTemperaturesAreRehearsedOnlyForAModelOrAnEffectThatDependsOnThem) {
+  const model::Model m = a_drive();
+  PlanRequest q = request_for(m);
+  q.setting.temperature = true;
+  const auto warm = [](const RehearsedMotions& rehearsed) {
+    return any(rehearsed.motions(), [](const planning::Run& r) { return r.temperature_c.has_value(); });
+  };
+  EXPECT_FALSE(warm(RehearsedMotions(q)));
+  EXPECT_FALSE(warm(RehearsedMotions(q, {"current_offset", "torque_bias"})));
+  EXPECT_TRUE(warm(RehearsedMotions(q, {"temperature_viscous", "temperature_coulomb"})));
+}
+
+TEST(Planning, AParameterOfMoreThanOnePercentIsNotSaidToBeKnownWell) {
+  const model::Model m = a_drive();
+  PlanRequest q = request_for(m);
+  q.most_motions = 1;
+  q.setting.locked = false;
+  const Design d = d_optimal(q);
+  const auto open = std::find_if(d.parameters.begin(), d.parameters.end(),
+                                 [](const Precision& p) { return p.id == "linear_stiffness"; });
+  ASSERT_NE(open, d.parameters.end());
+  EXPECT_FALSE(open->precise());
+  ASSERT_FALSE(d.plan.notes.empty());
+  EXPECT_NE(d.plan.notes.front().find("linear_stiffness.stiffness (unknown)"), std::string::npos)
+      << d.plan.notes.front();
+  EXPECT_FALSE((Precision{"a", "b", "", 1.0, std::nullopt, 110.0}.precise()));
+  EXPECT_FALSE((Precision{"a", "b", "", 1.0, 0.5, std::nullopt}.precise()));
+  EXPECT_TRUE((Precision{"a", "b", "", 1.0, std::nullopt, 0.5}.precise()));
+}
+
+TEST(Planning, TheEffortOfTorquesWithoutATorqueConstantIsNoCurrent) {
+  model::Model m = a_drive();
+  data::Dataset dataset;
+  dataset.experiments = {a_record(data::Load::free, 0.07)};
+  // The rated current of 3 A is known, and what it is as a torque.
+  EXPECT_TRUE(sensors_of(m, &dataset).current);
+  EXPECT_DOUBLE_EQ(setting_of(m, &dataset).limits.current_a, 3.0);
+  m.drive.torque_constant_nm_a.value.reset();
+  EXPECT_FALSE(sensors_of(m, &dataset).current);
+  EXPECT_DOUBLE_EQ(setting_of(m, &dataset).limits.current_a, 0.07);
+}
+
+TEST(Planning, TheTravelOfALinearAxisIsThatOfTheData) {
+  model::Model m = a_drive();
+  m.drive.axis = data::Axis::linear;
+  m.drive.gear_ratio.value = 1.0;
+  EXPECT_EQ(setting_of(m, nullptr).limits.travel_rad, 0.0);
+  data::Dataset dataset;
+  dataset.experiments = {a_record(data::Load::free)};
+  EXPECT_DOUBLE_EQ(setting_of(m, &dataset).limits.travel_rad, 0.004 * 99);
 }
 
 TEST(Planning, ACurrentThatMovesNothingShowsNothing) {

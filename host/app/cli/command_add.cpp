@@ -8,6 +8,7 @@
 #include "host/app/cli/report_option.hpp"
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/user_defined_effects.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/learned_table.hpp"
 #include "host/output/answers/text.hpp"
@@ -63,6 +64,9 @@ void print(const Addition& change, const std::string& what, Console& console) {
     values.row({fmt::format("{}.{}", e.id, e.parameter), number(e.value, kDigits), number(e.low, kDigits),
                 number(e.high, kDigits), e.unit});
   console.line(values.text());
+  for (const model::Effect& effect : change.model.effects)
+    if (const std::string reference = output::reference_text(effect.type, change.model.drive); !reference.empty())
+      console.line(fmt::format("  {}: {}", effect.id, reference));
   for (const auto& [id, learned] : change.tables) {
     console.line();
     console.line(output::learned_table_text(id, change.model.find(id)->definition->variable, learned, change.unit));

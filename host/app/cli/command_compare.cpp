@@ -9,6 +9,7 @@
 #include "host/app/cli/report_option.hpp"
 #include "host/engine/comparison/compare.hpp"
 #include "host/output/answers/comparison.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 
@@ -41,8 +42,10 @@ Limit parse_limit(const std::string& text) {
   const std::string value = equals == std::string::npos ? "" : text.substr(equals + 1);
   const auto [stop, error] = std::from_chars(value.data(), value.data() + value.size(), limit.rmse);
   if (!known || error != std::errc{} || stop != value.data() + value.size() || !(limit.rmse >= 0.0))
-    throw UsageError(fmt::format("--limit {} is not SIGNAL=RMSE; signals are {}, as in --limit motor_balance=0.02",
-                                 text, output::listed({std::begin(kSignals), std::end(kSignals)}, "and")));
+    throw UsageError(
+        fmt::format("--limit {} is not SIGNAL=RMSE with a number in the signal's SI unit; signals are {}, as in "
+                    "--limit motor_balance=0.02",
+                    text, output::listed({std::begin(kSignals), std::end(kSignals)}, "and")));
   return limit;
 }
 
@@ -79,7 +82,7 @@ int run(const CompareOptions& options, Console& console) {
   console.progress("comparing model and measurement");
   const comparison::Comparison comparison =
       comparison::compare(dataset, file.model, options.pipeline.options(), baselines);
-  for (const std::string& warning : comparison.warnings) console.warn(warning);
+  for (const std::string& warning : comparison.warnings) console.warn(output::words_on(file.model.drive.axis, warning));
   console.line(output::comparison_table(comparison));
   if (!options.report.empty())
     write_report(options.report,
@@ -119,10 +122,12 @@ Command compare_command() {
   return command<CompareOptions>(
       {"compare",
        "model against measurement, by experiment, signal and region",
-       "Compares in both directions: the torque that the model needs for the measured motion (the balances), and the "
+       "Compares in both directions: the torque (on a linear axis the force) that the model needs for the measured "
+       "motion (the balances), and the "
        "motion that it predicts from the motor's current or torque alone (free run). Errors are shown with the noise "
        "of the "
-       "measurement where that is known; the regions with the largest excess over it are named. --limit sets a "
+       "measurement where that is known; experiments are in the order of DATA, files of a folder by name; the regions "
+       "with the largest excess over it are named. --limit sets a "
        "limit: exit code 1 where a signal's error is above it. --baseline fits a linear black box (FIR or ARX) to the "
        "same signals, on the experiments that are not held out, and shows what error its many parameters reach. "
        "--report writes a page with plots of all of it.",

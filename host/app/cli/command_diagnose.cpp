@@ -7,6 +7,7 @@
 #include "host/app/cli/report_option.hpp"
 #include "host/engine/selection/add_until_complete.hpp"
 #include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 
 namespace flexspline::cli {
@@ -60,12 +61,12 @@ int run(const DiagnoseOptions& options, Console& console) {
   how.progress = [&](std::string_view stage) { console.progress(stage); };
   std::size_t round = 0;
   const auto print = [&](const selection::Diagnosis& found) {
-    for (const std::string& warning : found.warnings) console.warn(warning);
+    for (const std::string& warning : found.warnings) console.warn(output::words_on(file.model.drive.axis, warning));
     if (options.all) {
       console.line();
       console.line(console.bold(fmt::format("Round {}", ++round)));
     }
-    output::print_diagnosis(console, found, add_command(options));
+    output::print_diagnosis(console, found, add_command(options), &file.model.drive);
   };
   const selection::StepwiseSelection done =
       selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, print);

@@ -4,6 +4,7 @@
 
 #include "host/app/cli/command.hpp"
 #include "host/app/cli/common_options.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/effect_curve.hpp"
 #include "host/output/answers/identification.hpp"
 #include "host/output/answers/json.hpp"
@@ -109,8 +110,12 @@ void describe(const Entry& entry, Console& console) {
                output::number(p.usual)});
   }
   console.line(table.text_within(output::line_width()));
+  if (const std::string rule = output::reference_rule(info.name); !rule.empty()) console.line(output::wrapped(rule));
   console.line();
-  console.line("At these values:");
+  console.line(
+      info.equation.find("wref") == std::string_view::npos
+          ? "At these values:"
+          : fmt::format("At these values, and wref = {}:", output::with_unit(output::kRatedVelocityOfCurves, "rad/s")));
   console.line(output::curve_text(output::effect_curve(entry), output::takes_braille()));
   console.line();
   const auto print = [&](std::string_view what, std::string_view text) {

@@ -72,7 +72,7 @@ int run(const IdentifyOptions& options, Console& console) {
   } catch (const std::invalid_argument& unsuitable) {
     throw UsageError(unsuitable.what());
   }
-  for (const std::string& warning : found->warnings) console.warn(warning);
+  for (const std::string& warning : output::warnings_of(*found)) console.warn(warning);
   console.line(output::identification_text(*found));
 
   if (options.out.empty()) {

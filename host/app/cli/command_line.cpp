@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <regex>
 
 #include "host/app/cli/arguments.hpp"
 #include "host/app/cli/help_format.hpp"
@@ -35,6 +36,15 @@ CLI::Validator sign_check(bool zero_is_allowed) {
                            has_comma ? "; write it without a comma, as 1000 or 0.05" : "");
       },
       name);
+}
+
+// "--separate: At least 2 required but received 1": says nothing of how values are separated.
+std::string in_words(const std::string& error) {
+  static const std::regex too_few("(.*): At least ([0-9]+) required but received ([0-9]+)");
+  std::smatch part;
+  if (!std::regex_match(error, part, too_few)) return error;
+  return fmt::format("{} takes {} values with a comma between them, and {} {} given", part.str(1), part.str(2),
+                     part.str(3), part.str(3) == "1" ? "was" : "were");
 }
 
 }  // namespace
@@ -183,7 +193,7 @@ class CommandLine {
       if (error.get_exit_code() == 0) return app_.exit(error);
       const std::string misspelt = misspelt_option(arguments, options_of(command));
       fmt::print(stderr, "flexspline {}: {}; flexspline {} --help shows what it takes\n", command,
-                 misspelt.empty() ? error.what() : misspelt.c_str(), command);
+                 misspelt.empty() ? in_words(error.what()) : misspelt, command);
       return kUnusable;
     }
     return run_chosen(command);

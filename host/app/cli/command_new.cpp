@@ -114,6 +114,12 @@ void declare(Parser& parser, NewOptions& options) {
       .value("OURS")
       .one_value_each_time();
   parser.option("--axis", options.request.axis, "rotary, or linear (m, m/s, N)").one_of({"rotary", "linear"}).value("");
+  parser
+      .option("--load", options.request.load,
+              "the output: free, or locked so that it cannot turn, in all recordings of DATA (default: as they state, "
+              "else free); where they differ, correct load under each [[experiment]] of dataset.toml")
+      .one_of({"free", "locked"})
+      .value("");
   parser.option("--gear-ratio", options.request.gear_ratio, "motor turns per output turn").positive().value("N");
   parser
       .option("--position-side", options.request.position_side,

@@ -58,7 +58,8 @@ std::string as_given(const project::Request& request) {
   for (const std::string& map : request.map) line += as_argument("--map", map);
   for (const std::string& name : request.without) line += as_argument("--without", name);
   for (const std::string& name : request.turned) line += as_argument("--turn", name);
-  line += as_argument("--axis", request.axis) + as_argument("--position-side", request.position_side);
+  line += as_argument("--axis", request.axis) + as_argument("--load", request.load) +
+          as_argument("--position-side", request.position_side);
   if (request.joint) line += fmt::format(" --joint {}", *request.joint);
   if (request.pole_pairs) line += fmt::format(" --pole-pairs {}", *request.pole_pairs);
   line += number_argument("--gear-ratio", request.gear_ratio);

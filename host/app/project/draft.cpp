@@ -238,6 +238,11 @@ void turn(HeaderGuess& guess, const std::vector<std::string>& turned) {
 
 void add_stated_facts(Draft& draft, const Request& request) {
   if (!request.axis.empty()) draft.toml.drive["axis"] = text_value(request.axis);
+  if (!request.load.empty()) {
+    // One line for each experiment, where a user corrects it for one of them.
+    for (data::ExperimentEntry& entry : draft.toml.experiments) entry.keys["load"] = text_value(request.load);
+    draft.notes.push_back(fmt::format("the output is {} in all recordings, as stated", request.load));
+  }
   if (request.gear_ratio) draft.toml.drive["gear_ratio"] = number_value(*request.gear_ratio);
   if (request.torque_constant_nm_a)
     draft.toml.drive["torque_constant_nm_a"] = number_value(*request.torque_constant_nm_a);

@@ -17,6 +17,7 @@ struct Request {
   std::vector<std::string> without;   // columns of theirs that are not used, whatever their names say
   std::vector<std::string> turned;    // columns of ours whose sign is the other one
   std::string axis;                   // empty: guessed
+  std::string load;                   // of the output: free, locked; empty: as the files state
   std::string position_side;          // "link", "motor"; empty: guessed
   std::optional<int> pole_pairs;
   std::optional<int> joint;  // of a file with several

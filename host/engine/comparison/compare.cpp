@@ -202,7 +202,7 @@ class Comparer {
     const std::size_t wanted = std::min(std::clamp(rows / kRowsPerBin, kFewestBins, kMostBins),
                                         std::max<std::size_t>(1, rows / kFewestInRegion));
     for (const SampleVariable& variable : sample_variables(data, model_.drive.axis)) {
-      const Bins bins = equal_count_bins(variable.values, wanted);
+      const Bins bins = equal_count_bins(variable.values, wanted, variable.narrowest_bin);
       struct Sums {
         double error = 0.0, squared = 0.0, floor = 0.0;
         std::size_t rows = 0;

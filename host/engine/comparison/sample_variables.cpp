@@ -13,6 +13,9 @@ using estimation::Balance;
 using estimation::Record;
 using estimation::RegressionProblem;
 
+// Friction changes by some 2 % per degree.
+constexpr double kNarrowestTemperature_c = 1.0;
+
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 template <class Value>
@@ -92,6 +95,8 @@ std::vector<SampleVariable> sample_variables(const RegressionProblem& data, data
         [&](const Record& r, std::size_t k) { return has_torsion(r) ? r.inputs.torsion_rate_at(k) : kNone; });
   add("temperature", "degC",
       [&](const Record& r, std::size_t k) { return r.has_temperature ? r.inputs.temperature_at(k) : kNone; });
+  if (!variables.empty() && variables.back().name == "temperature")
+    variables.back().narrowest_bin = kNarrowestTemperature_c;
   add("time", "s", [&](const Record& r, std::size_t k) { return r.experiment->time_s[k]; });
   const Record* travelled = nullptr;
   std::vector<double> travel;
@@ -112,7 +117,7 @@ Eigen::VectorXd sample_directions(const RegressionProblem& data) {
   });
 }
 
-Bins equal_count_bins(const Eigen::VectorXd& values, std::size_t wanted) {
+Bins equal_count_bins(const Eigen::VectorXd& values, std::size_t wanted, double narrowest) {
   Bins bins;
   bins.bin.assign(static_cast<std::size_t>(values.size()), -1);
   std::vector<double> sorted;
@@ -120,11 +125,13 @@ Bins equal_count_bins(const Eigen::VectorXd& values, std::size_t wanted) {
     if (std::isfinite(x)) sorted.push_back(x);
   if (sorted.empty() || wanted == 0) return bins;
   std::sort(sorted.begin(), sorted.end());
+  if (narrowest > 0.0 && sorted.back() - sorted.front() < 2.0 * narrowest) return bins;
   std::vector<double> edges{sorted.front()};
   for (std::size_t b = 1; b < wanted; ++b) {
     const double edge = sorted[b * sorted.size() / wanted];
-    if (edge > edges.back()) edges.push_back(edge);
+    if (edge > edges.back() && edge - edges.back() >= narrowest) edges.push_back(edge);
   }
+  while (edges.size() > 1 && sorted.back() - edges.back() < narrowest) edges.pop_back();
   if (sorted.back() > edges.back())
     edges.push_back(sorted.back());
   else if (edges.size() < 3)

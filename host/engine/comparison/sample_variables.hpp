@@ -13,6 +13,8 @@ struct SampleVariable {
   std::string name;        // velocity, speed, acceleration, motor_angle, output_angle, current, torque, ...
   std::string unit;        // "" for none
   Eigen::VectorXd values;  // one a sample; NaN where the sample's record does not have it
+  // Narrower bins have no physical meaning, however many samples they have.
+  double narrowest_bin = 0.0;
 };
 
 // All variables that the data hold and that vary: velocity, speed (of the motor; of the output on the load balance),
@@ -30,7 +32,8 @@ struct Bins {
   std::size_t count() const { return edges.empty() ? 0 : edges.size() - 1; }
 };
 
-// At most `wanted` bins; fewer where values are repeated. None where all values are equal.
-Bins equal_count_bins(const Eigen::VectorXd& values, std::size_t wanted);
+// At most `wanted` bins; fewer where values are repeated or bins would be narrower than `narrowest`. None where all
+// values are equal, or where their range is too narrow for two bins.
+Bins equal_count_bins(const Eigen::VectorXd& values, std::size_t wanted, double narrowest = 0.0);
 
 }  // namespace flexspline::comparison

@@ -16,8 +16,8 @@ namespace {
 constexpr double kEnough = 10.0 * kDistinguished;
 // A motion that improves the result by less than a fifth is not worth its time.
 constexpr double kWorthwhile = 1.2;
-// Relative standard deviation at which a parameter is known well enough.
-constexpr double kPrecisePercent = 1.0;
+// Of a value whose 95 % interval reaches zero.
+constexpr double kMayBeZeroPercent = 100.0 / 1.96;
 // Cost of one unit of effort for the operator, in seconds of recording.
 constexpr double kTrouble_s = 15.0;
 
@@ -90,6 +90,7 @@ double duration(const Motion& motion) {
 Design begin(const PlanRequest& request, const RehearsedMotions& rehearsed) {
   Design design;
   design.axis = rehearsed.model().drive.axis;
+  design.effort_is_current = request.sensors.current;
   design.plan.model = rehearsed.model().name;
   design.plan.sample_s = request.sample_s;
   design.plan.limits = request.setting.limits;
@@ -183,6 +184,28 @@ class Parameters {
   std::vector<Precision> list_;
 };
 
+// Without an exponent, which is hard to read as a share.
+std::string percent_text(double percent) {
+  return percent < 100.0 ? fmt::format("{:.2g}", percent) : fmt::format("{:.0f}", percent);
+}
+
+// Says which parameters stay less precise than is required.
+void note_imprecise(Design& design) {
+  std::string open;
+  for (const Precision& p : design.parameters)
+    if (!p.precise())
+      open += fmt::format("{}{}.{}{}", open.empty() ? "" : ", ", p.id, p.parameter,
+                          p.percent_after ? fmt::format(" ({} %{})", percent_text(*p.percent_after),
+                                                        *p.percent_after > kMayBeZeroPercent ? ": may be zero" : "")
+                                          : " (unknown)");
+  if (open.empty()) return;
+  design.plan.notes.push_back(fmt::format("{} Relative standard deviations of {:g} % or more: {}.",
+                                          design.plan.runs.empty()
+                                              ? "No motion within these limits adds enough to what is known."
+                                              : "With these motions not all parameters are known well.",
+                                          kPrecisePercent, open));
+}
+
 double log_determinant(const Eigen::MatrixXd& information) {
   // A prior of ten times the value prevents that parameters that no motion shows dominate the choice.
   const Eigen::Index n = information.rows();
@@ -192,7 +215,7 @@ double log_determinant(const Eigen::MatrixXd& information) {
 }  // namespace
 
 Design discriminate(const PlanRequest& request, std::string_view first, std::string_view second) {
-  RehearsedMotions rehearsed(request);
+  RehearsedMotions rehearsed(request, {first, second});
   if (request.progress) request.progress("comparing the effects on all motions");
   ColumnLayout layout;
   // An effect that the model has already is one of the two that may be missing.
@@ -289,6 +312,7 @@ Design d_optimal(const PlanRequest& request) {
   const auto after = Parameters::percent(information);
   for (std::size_t j = 0; j < after.size(); ++j) design.parameters[j].percent_after = after[j];
   take(rehearsed, chosen, design);
+  note_imprecise(design);
   return design;
 }
 

@@ -139,8 +139,11 @@ class Builder {
     both("loaded-sine", velocity("", Waveform::sine, 0.4, 0.5));
   }
   void temperatures(std::vector<Motion>& list) const {
-    const Run slow = velocity("slow", Waveform::triangle, 0.06, 0.25);
-    const Run fast = velocity("fast", Waveform::triangle, 1.0, 0.25);
+    const double full = s_.locked_current_a;
+    const Run slow = s_.free ? velocity("slow", Waveform::triangle, 0.06, 0.25)
+                             : current("locked-slow", Waveform::sine, full, 0.25, true);
+    const Run fast = s_.free ? velocity("fast", Waveform::triangle, 1.0, 0.25)
+                             : current("locked-fast", Waveform::sine, full, 1.0, true);
     Motion motion{"two-temperatures", {}, 3.0};
     for (const double temperature : {s_.cold_c, s_.warm_c})
       for (Run run : {slow, fast}) {
@@ -159,7 +162,8 @@ class Builder {
 std::vector<Motion> motions(const MotionSettings& setting) {
   std::vector<Motion> list;
   const Builder build(setting);
-  build.free_motions(list);
+  const bool locked = setting.locked && setting.locked_current_a > 0.0;
+  if (setting.free) build.free_motions(list);
   if (setting.off) {
     Run run;
     run.name = "drive-off";
@@ -169,9 +173,9 @@ std::vector<Motion> motions(const MotionSettings& setting) {
     run.instructions = "Switch the drive's power stage off and leave the axis at rest; the sensors stay on.";
     list.push_back({"drive-off", {run}, 0.5});
   }
-  if (setting.locked && setting.locked_current_a > 0.0) build.locked_motions(list);
-  if (setting.external_load && setting.limits.load_torque_nm > 0.0) build.loaded_motions(list);
-  if (setting.temperature) build.temperatures(list);
+  if (locked) build.locked_motions(list);
+  if (setting.free && setting.external_load && setting.limits.load_torque_nm > 0.0) build.loaded_motions(list);
+  if (setting.temperature && (setting.free || locked)) build.temperatures(list);
   return list;
 }
 

@@ -15,6 +15,7 @@ struct MotionSettings {
   double locked_current_a = 0.0;  // that the gear carries with its output locked
   double run_s = 8.0;
   bool off = true;
+  bool free = true;  // the output can move
   bool locked = true;
   bool external_load = true;
   bool temperature = true;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/engine/selection/add.hpp"
 #include "host/physics/catalogue/user_defined_effect.hpp"
 #include "host/physics/simulation/simulation.hpp"
 
@@ -74,6 +75,39 @@ double noise_level(const RegressionProblem& data) {
   return std::sqrt(sum / std::max(1.0, rows));
 }
 
+bool reads_temperature(const catalogue::Entry& entry) {
+  return (entry.info->reads & effects::kTemperature) != 0;
+}
+
+// The way from end to end that the data show at the output.
+double largest_travel(const data::Dataset* dataset, double gear_ratio) {
+  double most = 0.0;
+  if (dataset)
+    for (const data::Experiment& e : dataset->experiments) {
+      const bool output = e.has(Column::output_position);
+      const std::vector<double>& position = e[output ? Column::output_position : Column::motor_position];
+      if (position.empty()) continue;
+      const auto [low, high] = std::minmax_element(position.begin(), position.end());
+      most = std::max(most, (*high - *low) / (output ? 1.0 : gear_ratio));
+    }
+  return most;
+}
+
+std::optional<double> torque_constant_of(const model::Drive& drive, const data::Dataset* dataset) {
+  if (drive.torque_constant_nm_a.value || !dataset) return drive.torque_constant_nm_a.value;
+  return dataset->drive.torque_constant_nm_a;
+}
+
+// The largest effort, in A or, where it is a torque, N m.
+double effort_limit(const model::Drive& drive, const data::Dataset* dataset, const Sensors& sensors) {
+  // A rated current says nothing of a torque without the torque constant. A motion that has been recorded before may
+  // be repeated.
+  if (!sensors.current) return largest(dataset, Column::motor_torque);
+  if (drive.rated_current_a.value) return *drive.rated_current_a.value;
+  if (const double current = largest(dataset, Column::current); current > 0.0) return current;
+  return largest(dataset, Column::motor_torque) / torque_constant_of(drive, dataset).value_or(1.0);
+}
+
 bool complete(const model::Model& model) {
   for (const model::Effect& e : model.effects)
     for (const model::Parameter& p : e.parameters)
@@ -85,10 +119,11 @@ bool complete(const model::Model& model) {
 
 }  // namespace
 
-Sensors sensors_of(const data::Dataset* dataset) {
+Sensors sensors_of(const model::Model& model, const data::Dataset* dataset) {
   Sensors sensors;
   if (!dataset || dataset->experiments.empty()) return sensors;
-  sensors.current = dataset->has(Column::current);
+  // A drive is given currents; a torque that was recorded is one where the constant is known.
+  sensors.current = dataset->has(Column::current) || torque_constant_of(model.drive, dataset).has_value();
   sensors.output_position = dataset->has(Column::output_position);
   sensors.torque = dataset->has(Column::torque);
   sensors.temperature = dataset->has(Column::temperature);
@@ -104,31 +139,31 @@ MotionSettings setting_of(const model::Model& model, const data::Dataset* datase
   MotionSettings setting;
   const model::Drive& drive = model.drive;
   setting.gear_ratio = drive.gear_ratio.value.value_or(dataset ? dataset->drive.gear_ratio.value_or(1.0) : 1.0);
-  // A motion that has been recorded before may be repeated.
-  setting.limits.current_a = drive.rated_current_a.value.value_or(largest(dataset, Column::current));
-  if (setting.limits.current_a == 0.0) setting.limits.current_a = largest(dataset, Column::motor_torque);
+  const bool linear = drive.axis == data::Axis::linear;
+  const Sensors sensors = sensors_of(model, dataset);
+  setting.limits.current_a = effort_limit(drive, dataset, sensors);
   setting.limits.velocity_rad_s = drive.rated_velocity_rad_s.value.value_or(largest(dataset, Column::motor_velocity));
-  setting.limits.travel_rad = 2.0 * M_PI;
+  setting.limits.travel_rad = linear ? largest_travel(dataset, setting.gear_ratio) : 2.0 * M_PI;
   setting.limits.duration_s = 180.0;
-  const double constant =
-      drive.torque_constant_nm_a.value.value_or(dataset ? dataset->drive.torque_constant_nm_a.value_or(1.0) : 1.0);
-  const double holds = setting.gear_ratio * constant;  // output torque per ampere
+  // Output torque per unit of effort.
+  const double holds = setting.gear_ratio * (sensors.current ? torque_constant_of(drive, dataset).value_or(1.0) : 1.0);
   const double rated = drive.rated_torque_nm.value.value_or(holds * setting.limits.current_a);
   setting.locked_current_a = std::min(setting.limits.current_a, rated / holds);
   // The drive has to move against it and friction.
   setting.limits.load_torque_nm = std::min(0.25 * rated, 0.3 * setting.limits.current_a * holds);
-  const bool linear = drive.axis == data::Axis::linear;
   if (linear) setting.limits.load_torque_nm = 0.0;
   setting.locked = setting.gear_ratio > 1.0;
   if (dataset) {
-    const bool any = std::any_of(dataset->experiments.begin(), dataset->experiments.end(),
-                                 [](const data::Experiment& e) { return e.has(Column::temperature); });
-    setting.temperature = any;
+    setting.temperature = dataset->has(Column::temperature);
+    const auto locked = [](const data::Experiment& e) { return e.load == data::Load::locked; };
+    const std::vector<data::Experiment>& all = dataset->experiments;
+    setting.free = all.empty() || !std::all_of(all.begin(), all.end(), locked);
+    setting.locked = setting.locked || std::any_of(all.begin(), all.end(), locked);
   }
   return setting;
 }
 
-RehearsedMotions::RehearsedMotions(const PlanRequest& request) {
+RehearsedMotions::RehearsedMotions(const PlanRequest& request, const std::vector<std::string_view>& effects) {
   if (request.dataset) {
     if (request.progress) request.progress("fitting the model");
     identified_ = estimation::identify(*request.dataset, *request.model, request.pipeline);
@@ -142,15 +177,24 @@ RehearsedMotions::RehearsedMotions(const PlanRequest& request) {
           model_.name));
     terms_ = estimation::terms_of(model_);
   }
-  rehearse_all(request);
+  bool temperature = std::any_of(terms_.begin(), terms_.end(),
+                                 [](const estimation::Term& term) { return reads_temperature(*term.entry); });
+  for (const std::string_view effect : effects)
+    temperature = temperature || reads_temperature(*selection::parse_effect(effect).entry);
+  rehearse_all(request, temperature);
   prepare(request);
 }
 
-void RehearsedMotions::rehearse_all(const PlanRequest& request) {
+void RehearsedMotions::rehearse_all(const PlanRequest& request, bool temperature) {
   if (request.progress) request.progress("rehearsing motions");
   const Limits& limits = request.setting.limits;
   std::string why = "there is none";
-  for (Motion& motion : planning::motions(request.setting)) {
+  MotionSettings setting = request.setting;
+  setting.temperature = setting.temperature && temperature;
+  std::vector<Motion> list = planning::motions(setting);
+  if (list.empty())
+    throw PlanError("what this drive is said not to do leaves no motion; take something out of --without");
+  for (Motion& motion : list) {
     std::vector<Design::Peak> peaks;
     std::vector<data::Experiment> experiments;
     for (Run& run : motion.runs) {

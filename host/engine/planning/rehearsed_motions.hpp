@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "host/engine/estimation/identify.hpp"
@@ -12,8 +13,9 @@ namespace flexspline::planning {
 
 class RehearsedMotions {
  public:
-  // Identifies the model where there are data, rehearses all motions, drops those that break a limit.
-  explicit RehearsedMotions(const PlanRequest& request);
+  // Identifies the model where there are data, rehearses all motions, drops those that break a limit. `effects` may be
+  // missing in the model.
+  explicit RehearsedMotions(const PlanRequest& request, const std::vector<std::string_view>& effects = {});
 
   const model::Model& model() const { return model_; }
   const estimation::Identification* identified() const { return identified_.get(); }
@@ -34,7 +36,7 @@ class RehearsedMotions {
   std::size_t first_record(std::size_t motion) const { return first_record_[motion]; }
 
  private:
-  void rehearse_all(const PlanRequest& request);
+  void rehearse_all(const PlanRequest& request, bool temperature);
   void prepare(const PlanRequest& request);
 
   model::Model model_;

@@ -10,7 +10,8 @@
 namespace flexspline::data {
 
 // What to do where an output that does not move is held on purpose.
-inline constexpr std::string_view kStateLocked = "write load = \"locked\" under its [[experiment]] in dataset.toml";
+inline constexpr std::string_view kStateLocked =
+    "write load = \"locked\" under its [[experiment]] in dataset.toml, or give --load locked to flexspline new";
 
 // On the samples as they are in the file, before any resampling; `segments` and `masked` must be set.
 

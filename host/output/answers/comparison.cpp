@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "host/output/answers/drive_words.hpp"
+
 namespace flexspline::output {
 namespace {
 
@@ -17,15 +19,11 @@ using comparison::SignalResult;
 
 constexpr std::size_t kRegionsInWords = 3;
 
-bool is_balance(const SignalResult& s) {
-  return s.signal.ends_with("_balance");
-}
-
-// Times the noise floor, or where there is none, share of the signal. A free run comes second: it sums errors up.
+// Times the noise floor, or where there is none, share of the signal. A free run sums errors up and does not count.
 double badness(const ExperimentResult& e) {
   double worst = 0.0;
   for (const SignalResult& s : e.signals)
-    if (is_balance(s)) {
+    if (s.signal.ends_with("_balance")) {
       const double bad = s.excess().value_or(s.nrmse);
       if (std::isfinite(bad)) worst = std::max(worst, bad);
     }
@@ -48,8 +46,8 @@ void add_line(std::string& text, std::size_t width, std::string_view first, cons
                  cell(s.h_infinity.value));
 }
 
-std::string words(const Region& r, const SignalResult& overall) {
-  std::string signal = r.signal, variable = r.variable;
+std::string words(const Region& r, const SignalResult& overall, data::Axis axis) {
+  std::string signal = words_on(axis, r.signal), variable = words_on(axis, r.variable);
   std::replace(signal.begin(), signal.end(), '_', ' ');
   std::replace(variable.begin(), variable.end(), '_', ' ');
   const std::string unit = r.variable_unit.empty() ? "" : " " + r.variable_unit;
@@ -91,14 +89,11 @@ std::string comparison_table(const Comparison& comparison) {
   for (const ExperimentResult& e : comparison.experiments) width = std::max(width, label(e).size());
   std::string text = fmt::format("{:<{}} {:<20} {:>10} {:<6} {:>8} {:>10} {:>8} {:>10} {:>8}\n", "experiment", width,
                                  "signal", "rmse", "unit", "rmse/std", "noise", "ratio", "max |e|", "H-inf");
-  std::vector<const ExperimentResult*> order;
-  for (const ExperimentResult& e : comparison.experiments) order.push_back(&e);
-  std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return badness(*a) > badness(*b); });
   bool collapsed = false;
-  for (const ExperimentResult* e : order) {
+  for (const ExperimentResult& e : comparison.experiments) {
     bool first = true;
-    for (const SignalResult& s : e->signals) {
-      add_line(text, width, first ? label(*e) : "", s);
+    for (const SignalResult& s : e.signals) {
+      add_line(text, width, first ? label(e) : "", s);
       collapsed = collapsed || s.collapsed;
       first = false;
     }
@@ -108,7 +103,13 @@ std::string comparison_table(const Comparison& comparison) {
     add_line(text, width, first ? "all together" : "", s);
     first = false;
   }
-  if (collapsed) text += "* motor and load as one balance: no torque was measured\n";
+  const data::Axis axis = axis_of(comparison.overall.empty() ? "" : comparison.overall.front().unit);
+  if (collapsed) text += words_on(axis, "* motor and load as one balance: no torque was measured\n");
+
+  const auto worst = std::max_element(comparison.experiments.begin(), comparison.experiments.end(),
+                                      [](const auto& a, const auto& b) { return badness(a) < badness(b); });
+  if (comparison.experiments.size() > 1)
+    text += fmt::format("Largest error of a balance, over its noise or else its signal: {}\n", label(*worst));
 
   const auto size = [&](const Region& r) {
     const SignalResult* overall = comparison.find_overall(r.signal);
@@ -129,7 +130,7 @@ std::string comparison_table(const Comparison& comparison) {
   }
   if (!printed.empty()) text += "\nWhere the error is largest:\n";
   for (const Region* r : printed)
-    if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall);
+    if (const SignalResult* overall = comparison.find_overall(r->signal)) text += "  " + words(*r, *overall, axis);
   if (!comparison.baselines.empty()) text += baseline_table(comparison.baselines);
   return text;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/explanation.hpp"
 #include "host/output/answers/identification.hpp"
 #include "host/output/answers/learned_table.hpp"
@@ -269,14 +270,14 @@ std::string words(const std::vector<selection::NamedEffect>& group) {
 }
 
 // What these data neither show nor rule out, and what to record.
-void print_possible(Console& console, const std::vector<selection::PossibleEffect>& possible) {
+void print_possible(Console& console, const std::vector<selection::PossibleEffect>& possible, data::Axis axis) {
   for (const selection::PossibleEffect& one : possible) {
     std::string text = fmt::format("These data do not decide whether {} is missing", words(one.group));
     if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
     text += fmt::format("; {}.", one.why_not);
     if (const catalogue::Entry* entry = catalogue::find(one.group.front().effect))
       text += fmt::format(" To decide, record: {}.", entry->info->separated_by);
-    console.line(wrapped(text));
+    console.line(wrapped(words_on(axis, text)));
   }
 }
 
@@ -292,16 +293,18 @@ void print_confounded_with_model(Console& console, const Diagnosis& d) {
   }
 }
 
-void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command) {
+void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command, const model::Drive* drive) {
+  const data::Axis axis = axis_of(d.unit);
   console.line(console.bold(wrapped(verdict_in_words(d), 0)));
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
-  print_possible(console, d.possible);
-  if (!d.localised.empty()) console.line(wrapped(fmt::format("The error depends on {}.", shares(d.localised))));
-  if (!d.delay_advice.empty()) console.line(wrapped(d.delay_advice));
-  if (!d.untried_advice.empty()) console.line(wrapped(d.untried_advice));
+  print_possible(console, d.possible, axis);
+  if (!d.localised.empty())
+    console.line(wrapped(words_on(axis, fmt::format("The error depends on {}.", shares(d.localised)))));
+  if (!d.delay_advice.empty()) console.line(wrapped(words_on(axis, d.delay_advice)));
+  if (!d.untried_advice.empty()) console.line(wrapped(words_on(axis, d.untried_advice)));
   for (const selection::NamedEffect& named : d.named)
-    if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit);
+    if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit, drive);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));
   if (d.at_stated_setting && d.at_stated_setting->named != d.named)
     console.line(wrapped(stated_setting_text(*d.at_stated_setting)));

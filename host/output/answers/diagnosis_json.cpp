@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/explanation.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/learned_table.hpp"
@@ -90,7 +91,7 @@ json candidate_json(const Candidate& c, std::size_t rank, const std::string& uni
   for (const estimation::Estimate& e : c.parameters) parameters.push_back(json_parameter(e));
   const catalogue::Entry* entry = catalogue::find(c.effect);
   const auto text = [&](std::string_view effects::Description::*field) {
-    return entry ? json(std::string(entry->info->*field)) : json(nullptr);
+    return entry ? json(words_on(axis_of(unit), entry->info->*field)) : json(nullptr);
   };
   return {{"effect", c.effect},
           {"order", json_number(c.order)},

@@ -41,7 +41,7 @@ catalogue::DriveConstants<double> drive() {
   catalogue::DriveConstants<double> d;
   d.gear_ratio = kGear;
   d.torque_constant = kTorqueConstant;
-  d.rated_velocity = 200.0;
+  d.rated_velocity = kRatedVelocityOfCurves;
   d.reference_temperature = kWarm;
   return d;
 }

@@ -9,6 +9,8 @@
 
 namespace flexspline::output {
 
+inline constexpr double kRatedVelocityOfCurves = 200.0;  // rad/s, of a drive of the report's class
+
 // One line through (x[k], y[k]) in the order of the motion; a loop ends where it began. NaN in y is a gap: what is on
 // the two sides of it are two directions.
 struct EffectCurve {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 #include "host/physics/catalogue/catalogue.hpp"
@@ -20,9 +21,9 @@ using selection::Evidence;
 
 constexpr int kBarWidth = 24;
 
-std::string variable_in_words(std::string name) {
+std::string variable_in_words(std::string name, const std::string& unit) {
   std::replace(name.begin(), name.end(), '_', ' ');
-  return name;
+  return words_on(axis_of(unit), name);
 }
 
 // A bar from the middle: to the right what is positive.
@@ -36,10 +37,10 @@ std::string bar(double value, double largest) {
 }
 
 void print_map(Console& console, const Evidence& map, const std::string& unit) {
-  console.line(
-      wrapped(fmt::format("Where it shows here: over {}. What the model lacks{}, and what the effect makes of it:",
-                          variable_in_words(map.variable), map.resisting ? " (positive: it resists the motion)" : "")));
-  Table table({fmt::format("{}{}", variable_in_words(map.variable), map.unit.empty() ? "" : ", " + map.unit),
+  console.line(wrapped(
+      fmt::format("Where it shows here: over {}. What the model lacks{}, and what the effect makes of it:",
+                  variable_in_words(map.variable, unit), map.resisting ? " (positive: it resists the motion)" : "")));
+  Table table({fmt::format("{}{}", variable_in_words(map.variable, unit), map.unit.empty() ? "" : ", " + map.unit),
                "lacks, " + unit, "effect, " + unit, ""},
               "rrrl");
   double largest = 0.0;
@@ -50,15 +51,15 @@ void print_map(Console& console, const Evidence& map, const std::string& unit) {
   console.line(table.text(4));
 }
 
-void print_confounding(Console& console, const Candidate& c, std::string_view separated_by) {
+void print_confounding(Console& console, const Candidate& c, std::string_view separated_by, const std::string& unit) {
   for (const selection::ConfoundingReason& reason : c.confounding_reasons)
     console.line(wrapped(fmt::format(
-        "Cannot be distinguished from {} here: only {:.2g} % of its torque in these data is orthogonal to it{}.",
-        reason.effect, reason.own_percent,
-        reason.variable.empty() ? "" : fmt::format("; both depend on {}", variable_in_words(reason.variable)))));
+        "Cannot be distinguished from {} here: only {:.2g} % of its {} in these data is orthogonal to it{}.",
+        reason.effect, reason.own_percent, words_on(axis_of(unit), "torque"),
+        reason.variable.empty() ? "" : fmt::format("; both depend on {}", variable_in_words(reason.variable, unit)))));
   if (!c.cannot_distinguish.empty() && !separated_by.empty())
-    console.line(
-        wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.", separated_by)));
+    console.line(wrapped(fmt::format("To separate them, record {}; flexspline plan --separate designs it.",
+                                     words_on(axis_of(unit), separated_by))));
 }
 
 // What on this drive makes a ripple of this order.
@@ -75,33 +76,36 @@ void print_order_causes(Console& console, const Candidate& c) {
 
 }  // namespace
 
-void print_explanation(Console& console, const Candidate& c, const std::string& unit) {
+void print_explanation(Console& console, const Candidate& c, const std::string& unit, const model::Drive* drive) {
   const catalogue::Entry* entry = catalogue::find(c.effect);
   if (entry == nullptr) return;
   const effects::Description& info = *entry->info;
   console.line();
   console.line(console.bold(effect_in_words(c.effect, c.order)));
   const auto print = [&](std::string_view what, std::string_view text) {
-    if (!text.empty()) console.line(wrapped(fmt::format("{}{}", what, text)));
+    if (!text.empty()) console.line(wrapped(fmt::format("{}{}", what, words_on(axis_of(unit), text))));
   };
   print("", info.explanation);
   for (const estimation::Estimate& e : c.parameters)
     console.line(
         fmt::format("  {} = {}{}", e.parameter, with_unit(e.value, e.unit),
                     e.low && e.high ? fmt::format("   (95 %: {} to {})", number(*e.low), number(*e.high)) : ""));
+  if (const std::string reference = drive ? reference_text(c.effect, *drive) : ""; !reference.empty())
+    console.line(fmt::format("  {}", reference));
   if (c.size)
-    console.line(wrapped(fmt::format(
-        "Its torque that the model cannot replace: {} {} (RMS), {} at most{}.", number(c.size->rms), unit,
-        number(c.size->peak),
-        c.size->percent_of_rated ? fmt::format("; {} % of the rated torque", number(*c.size->percent_of_rated, 2))
-                                 : "")));
+    console.line(wrapped(words_on(
+        axis_of(unit), fmt::format("Its torque that the model cannot replace: {} {} (RMS), {} at most{}.",
+                                   number(c.size->rms), unit, number(c.size->peak),
+                                   c.size->percent_of_rated
+                                       ? fmt::format("; {} % of the rated torque", number(*c.size->percent_of_rated, 2))
+                                       : ""))));
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);
   print_order_causes(console, c);
   print("Usual causes: ", info.causes);
   print("Check on the machine: ", info.check);
-  print_confounding(console, c, info.separated_by);
+  print_confounding(console, c, info.separated_by, unit);
 }
 
 std::string detectable_in_words(const Candidate& c) {

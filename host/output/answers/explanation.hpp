@@ -9,8 +9,9 @@
 
 namespace flexspline::output {
 
-// `unit` of the balance's errors.
-void print_explanation(Console& console, const selection::Candidate& candidate, const std::string& unit);
+// `unit` of the balance's errors. `drive`, where it is known, has what the effect's law refers to.
+void print_explanation(Console& console, const selection::Candidate& candidate, const std::string& unit,
+                       const model::Drive* drive = nullptr);
 
 // "coefficient 8.2e-4"; empty where there is none.
 std::string detectable_in_words(const selection::Candidate& candidate);

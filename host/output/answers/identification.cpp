@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 
@@ -159,8 +160,12 @@ std::string pooled(const estimation::Identification& found) {
     table.row({label(e), number(e.value, kDigits), number(e.low, kDigits), number(e.high, kDigits), e.unit,
                e.excitation ? fmt::format("{:.3g} %", 100.0 * *e.excitation) : "",
                e.identifiable ? (e.fixed ? "known" : "") : "these data do not identify it"});
-  return table.text() +
-         "\n  excited: the share of a parameter's effect on these data that no other parameter can explain";
+  std::string text =
+      table.text() + "\n  excited: the share of a parameter's effect on these data that no other parameter can explain";
+  for (const model::Effect& effect : found.model.effects)
+    if (const std::string reference = reference_text(effect.type, found.model.drive); !reference.empty())
+      text += fmt::format("\n  {}: {}", effect.id, reference);
+  return text;
 }
 
 std::string errors(const estimation::Identification& found) {
@@ -264,7 +269,14 @@ std::string identification_text(const estimation::Identification& found) {
     for (const estimation::Derived& d : found.derived) table.row({d.name, number(d.value), d.unit});
     text += "\n\n" + table.text();
   }
-  return text + "\n\n" + errors(found) + "\n\n" + wrapped(pipeline_text(found.prepared));
+  return text + "\n\n" + errors(found) + "\n\n" +
+         wrapped(words_on(found.model.drive.axis, pipeline_text(found.prepared)));
+}
+
+std::vector<std::string> warnings_of(const estimation::Identification& found) {
+  std::vector<std::string> warnings;
+  for (const std::string& warning : found.warnings) warnings.push_back(words_on(found.model.drive.axis, warning));
+  return warnings;
 }
 
 json identification_json(const estimation::Identification& found, const std::string& intervals) {
@@ -297,12 +309,12 @@ json identification_json(const estimation::Identification& found, const std::str
           {"cutoff_hz", json_number(p.row_cutoff_hz)},
           {"motion_cutoff_hz", json_number(p.motion_cutoff_hz)},
           {"derivatives", p.derivatives == estimation::Derivatives::kalman ? "kalman" : "butterworth"},
-          {"cutoff_reason", p.reason},
+          {"cutoff_reason", words_on(found.model.drive.axis, p.reason)},
           {"parameters", std::move(parameters)},
           {"derived", std::move(derived)},
           {"balances", std::move(balances)},
           {"condition_number", json_number(found.condition_number)},
-          {"warnings", found.warnings}};
+          {"warnings", warnings_of(found)}};
 }
 
 }  // namespace flexspline::output

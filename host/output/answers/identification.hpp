@@ -14,6 +14,8 @@ std::string pipeline_text(const estimation::PreparedData& prepared);
 // Table by experiment (as the report's tables 3 to 8), pooled values with 95 % intervals, derived values, errors of
 // the balances.
 std::string identification_text(const estimation::Identification& found);
+// In the words of the axis.
+std::vector<std::string> warnings_of(const estimation::Identification& found);
 
 // "flexspline-identify/1"; `intervals` by their name: profile.
 nlohmann::json identification_json(const estimation::Identification& found, const std::string& intervals);

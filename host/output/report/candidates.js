@@ -24,7 +24,7 @@ function candidateCard(c, round) {
   if (c.check) card.append(el("p", {}, el("strong", {}, "Check on the machine: "), c.check));
   if (c.rivals.length) {
     card.append(el("p", {}, el("strong", {}, "Not to be distinguished from: "), listed(c.rivals, "or"), " in these data. ",
-      c.rival_reasons.map((r) => `It cannot be distinguished from ${r.effect}: only ${number(r.own_percent, 2)} % of its torque is orthogonal to it${r.variable ? `; both depend on ${variableName(r.variable)}` : ""}.`).join(" ")));
+      c.rival_reasons.map((r) => `It cannot be distinguished from ${r.effect}: only ${number(r.own_percent, 2)} % of its ${effort} is orthogonal to it${r.variable ? `; both depend on ${variableName(r.variable)}` : ""}.`).join(" ")));
     if (c.separating_experiment) card.append(el("p", {}, el("strong", {}, "What would distinguish them: "), c.separating_experiment, "."));
   }
   if (c.parameters.length)

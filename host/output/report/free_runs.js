@@ -22,7 +22,7 @@ function freeRunGallery(traces) {
   const shown = experiments.filter((e) => traces.get(e.name)?.free_runs.length).sort((a, b) => freeRunBadness(b) - freeRunBadness(a));
   if (!shown.length) return;
   const s = section("Free run and measurement", "What the model does with the measured effort alone, from the measured start, in every experiment; the worst first. " +
-    "A free run adds up what friction and stiffness are wrong by, so that it shows what the torque balances hide.");
+    `A free run adds up what friction and stiffness are wrong by, so that it shows what the ${effort} balances hide.`);
   s.append(el("ul", { class: "key" }, [{ name: "measured", colour: "measured" }, { name: "free run of the model", colour: "model", dash: [6, 3] }].map(keyItem)));
   for (const e of shown) {
     const linked = new Linked();

@@ -150,7 +150,8 @@ json map_of(const View& view, const BalanceView& balance, const comparison::Samp
             const std::vector<comparison::Share>& shares, const Eigen::VectorXd& directions) {
   const std::vector<double> amplitudes =
       variable.name == "motor_angle" ? order_amplitudes(view, balance, balance.residual) : std::vector<double>{};
-  const Bins bins = comparison::equal_count_bins(variable.values, bins_for(balance.residual.size(), amplitudes));
+  const Bins bins = comparison::equal_count_bins(variable.values, bins_for(balance.residual.size(), amplitudes),
+                                                 variable.narrowest_bin);
   if (bins.count() < 2) return nullptr;
   json map{{"variable", variable.name},
            {"unit", variable.unit},

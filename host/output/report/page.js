@@ -43,6 +43,7 @@ const kVariableNames = {
 // Forces on a linear axis. The page of hil has no maps.
 const isLinear = (report.maps || []).some((b) => b.unit === "N");
 const effort = isLinear ? "force" : "torque", kEffort = isLinear ? "Force" : "Torque";
+if (isLinear) kSignalNames.torque = effort;
 if (isLinear) Object.assign(kVariableNames, { output_angle: "output position", torque: "force through the gear" });
 // "velocity x direction" and "motor_angle order 7" in words.
 function variableName(variable) {

@@ -90,7 +90,7 @@ function errorTable() {
     cells((signal) => e.signals.find((s) => s.signal === signal), (signal) => signalBefore(e.name, signal))));
   rows.push(el("tr", {}, el("th", { scope: "row" }, "all together"),
     cells((signal) => report.comparison.overall.find((s) => s.signal === signal), (signal) => before?.overall.find((s) => s.signal === signal))));
-  const note = "Root mean square error of the torque balances, with the motion as measured; noise is what a perfect model would leave. " +
+  const note = `Root mean square error of the ${effort} balances, with the motion as measured; noise is what a perfect model would leave. ` +
     `Up to ${kAtNoise} times the noise an error is that of the noise (green); above, something is missing (bold).`;
   return el("div", { class: "scroll" }, el("table", { class: "wide" }, el("caption", {}, note), head, el("tbody", {}, rows)));
 }
@@ -155,7 +155,7 @@ function fillExperiment(body, trace) {
 }
 
 {
-  const s = section("How good is the model?", "The model is asked for the torque that the measured motion takes, and that is compared with the torque that was measured, " +
+  const s = section("How good is the model?", `The model is asked for the ${effort} that the measured motion takes, and that is compared with the ${effort} that was measured, ` +
     "balance by balance: at the motor, through the gear, at the load. What is left over is the error.");
   s.append(...[errorTable(), freeRunTable(), baselineTable()].filter(Boolean));
   for (const warning of report.comparison.warnings) s.append(el("p", { class: "note" }, warning));
