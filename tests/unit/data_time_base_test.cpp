@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "tests/unit/data_test_files.hpp"
@@ -125,6 +127,18 @@ TEST(TimeBase, AHeldCommandIsHeldInResampling) {
   e.segments = base.segments;
   resample(e, base);
   for (const double amps : e[Column::current]) EXPECT_TRUE(amps == 1.0 || amps == 2.0) << amps;
+}
+
+TEST(TimeBase, TheStepOfAnEncoderIsKnownAlsoWhereSamplesAreResampledOrInOtherUnits) {
+  constexpr double kStep_deg = 360.0 / 65536.0;
+  const auto encoder_deg = [](double t) {
+    return kStep_deg * std::floor(0.5 * std::sin(kOmega_rad_s * t) / kStep_deg);
+  };
+  const TestFolder folder;
+  const Dataset data = load({folder.write(
+      "uneven.csv", csv_of(jittered_times(2000, 0.1), {{"current_a", current}, {"motor_position_deg", encoder_deg}}))});
+  const double step = kStep_deg * std::numbers::pi / 180.0;
+  EXPECT_NEAR(step_of(data.experiments[0], Column::motor_position).value(), step, 1e-3 * step);
 }
 
 TEST(TimeBase, SegmentsTooShortToFilterAreMaskedAndLeftOut) {

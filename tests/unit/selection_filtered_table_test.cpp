@@ -90,10 +90,22 @@ TEST(FilteredTable, TheMaskLeavesOutReversalsAndAlwaysRest) {
   const Setting kept = make_setting(low, all, false, false, policy),
                 masked = make_setting(low, all, true, false, policy);
   const auto seconds = [](const Setting& setting) { return 0.01 * static_cast<double>(setting.rows.rows()); };
-  // Of 1.88 s, rest of 0.2 s and half of 60 ms on both sides; then 60 ms on both sides of rest and of the reversal.
-  EXPECT_NEAR(seconds(kept), 1.88 - 0.26, 0.02);
+  // Of 1.88 s, rest of 0.2 s with the filter's reach of 60 ms on both sides; then 60 ms on both sides of the reversal.
+  EXPECT_NEAR(seconds(kept), 1.88 - 0.32, 0.02);
   EXPECT_NEAR(seconds(masked), 1.88 - 0.32 - 0.12, 0.03);
   EXPECT_EQ(make_setting(low, all, true, true, policy).runs.front().record, 1U);
+}
+
+// A period of 25 Hz is 40 ms.
+TEST(FilteredTable, AStopOfAQuarterOfAPeriodIsRestAndAShorterOneIsNot) {
+  RegressorTable table = two_sines();
+  table.velocity_over_noise.segment(600, 12).setConstant(1.0);
+  table.velocity_over_noise.segment(1300, 7).setConstant(1.0);
+  const RegressorTable low = filtered_table(table, all_columns(table), 25.0);
+  const auto state_at = [&](double s) { return low.states[static_cast<std::size_t>((s - 0.06) / 0.01)]; };
+  EXPECT_EQ(state_at(0.605), SampleState::at_rest);
+  EXPECT_EQ(state_at(0.65), SampleState::at_rest);
+  EXPECT_EQ(state_at(1.305), SampleState::near_reversal);
 }
 
 }  // namespace

@@ -76,6 +76,36 @@ TEST(WaldTest, ANameThatHeldOutExperimentsConfirmStaysThoughWhatElseIsMissingWid
   EXPECT_TRUE(result.named.empty());
 }
 
+Candidate presliding_of(double travel, double std) {
+  Candidate law;
+  law.effect = "dahl_friction";
+  estimation::Estimate& e = law.parameters.emplace_back();
+  e.ref.parameter = catalogue::get(law.effect).index_of("presliding");
+  e.value = travel;
+  e.std = std;
+  return law;
+}
+
+TEST(WaldTest, PreslidingWhoseTravelMayBeZeroIsTakenBackThoughHeldOutExperimentsConfirmIt) {
+  Diagnosis result = with(presliding_of(0.03, 0.02));
+  Resampling::FoundTerm found;
+  found.group = result.named;
+  found.held_out_ratio = 0.5;
+  result.resampling.emplace();
+  result.resampling->decides = true;
+  result.resampling->found = {found};
+  take_back_insignificant(result);
+  EXPECT_TRUE(result.named.empty());
+  ASSERT_EQ(result.possible.size(), 1u);
+  EXPECT_NE(result.candidates.front().why_not.find("sticks"), std::string::npos);
+}
+
+TEST(WaldTest, PreslidingOfAResolvedTravelStays) {
+  Diagnosis result = with(presliding_of(0.03, 0.01));
+  take_back_insignificant(result);
+  EXPECT_EQ(result.named.size(), 1u);
+}
+
 TEST(WaldTest, ASignificantNameStays) {
   Diagnosis result = with(candidate({1.0, -5.0}));
   take_back_insignificant(result);

@@ -49,6 +49,23 @@ TEST(Quantum, IsNoneOfNoise) {
   EXPECT_FALSE(quantum_of(noise).has_value());
 }
 
+// As linear interpolation between samples at uneven times does it.
+TEST(Quantum, IsNoneOfARoundedSignalThatWasResampled) {
+  const std::vector<double> rounded = sine(0.5, 1e-3, 0.0);
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> share(0.0, 0.1);
+  std::vector<double> resampled;
+  for (std::size_t k = 1; k < rounded.size(); ++k)
+    resampled.push_back(rounded[k] + share(random) * (rounded[k - 1] - rounded[k]));
+  EXPECT_FALSE(quantum_of(resampled).has_value());
+}
+
+TEST(Quantum, IsNotTheRoundingOfFloatingPoint) {
+  std::vector<double> signal;
+  for (int k = 0; k < 4000; ++k) signal.push_back(k % 4 == 0 ? 0.3 * k : signal.back() * (1.0 + 3e-16));
+  EXPECT_FALSE(quantum_of(signal).has_value());
+}
+
 TEST(Quantum, NeedsSomeSteps) {
   EXPECT_FALSE(quantum_of(std::vector<double>{0.0, 1.0, 2.0, 2.0}).has_value());
   EXPECT_FALSE(quantum_of({}).has_value());

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "host/app/project/effort_hold.hpp"
 #include "host/output/answers/text.hpp"
 #include "host/physics/model/signature.hpp"
 
@@ -27,6 +28,7 @@ FirstProject first_project(Draft& draft, const Request& request) {
     throw RequestError(
         fmt::format("no torque balance can be formed from these columns: {}; name the columns with --map",
                     output::listed(project.base.reasons, "and")));
+  take_hold_of_values(project.base.model, draft, project.dataset);
   return project;
 }
 

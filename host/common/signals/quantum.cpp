@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 namespace flexspline::signals {
@@ -56,8 +57,19 @@ std::optional<double> quantum_of(std::span<const double> signal) {
     const double count = step / quantum;
     return std::abs(count - std::round(count)) < 0.02 * std::max(1.0, 0.05 * count) + rounding;
   };
-  const auto multiples = static_cast<std::size_t>(std::count_if(steps.begin(), steps.end(), is_multiple));
-  return 10 * multiples >= 9 * steps.size() ? std::optional(quantum) : std::nullopt;
+  const auto are_multiples = [&](const std::vector<double>& some) {
+    const auto multiples = static_cast<std::size_t>(std::count_if(some.begin(), some.end(), is_multiple));
+    return some.size() >= kFewestSteps && 10 * multiples >= 9 * some.size();
+  };
+  // Any number is near a multiple of what is far smaller: small multiples decide. And rounding of floating point has
+  // steps of its own.
+  constexpr double kSmallMultiple = 20.0, kFloatingPoint = 1e-12;
+  std::vector<double> small;
+  std::ranges::copy_if(steps, std::back_inserter(small), [&](double s) { return s <= kSmallMultiple * quantum; });
+  double largest = 0.0;
+  for (const double x : signal) largest = std::max(largest, std::abs(x));
+  const bool is_one = quantum > kFloatingPoint * largest && are_multiples(steps) && are_multiples(small);
+  return is_one ? std::optional(quantum) : std::nullopt;
 }
 
 }  // namespace flexspline::signals

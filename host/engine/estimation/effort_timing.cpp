@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "host/common/signals/interpolate.hpp"
 #include "host/engine/estimation/least_squares.hpp"
@@ -73,11 +74,12 @@ std::optional<EffortLag> effort_lag(const Identification& found) {
   const Linearised own = linearised(*motor, fit, found.terms, parameters[b]);
   const Eigen::Index n = own.J.cols();
   Eigen::MatrixXd with_lag(own.J.rows(), n + 1);
-  with_lag << own.J, (own.residual - shifted.residual) / step_s;
+  Eigen::VectorXd slope = (own.residual - shifted.residual) / step_s;
+  with_lag << own.J, slope;
   const auto without = estimated(own.J, own.residual, *motor, fit),
              with = estimated(with_lag, own.residual, *motor, fit);
   if (!without || !with) return std::nullopt;
-  EffortLag lag{with->theta[n], std::sqrt(with->variance[n]), no_change(found)};
+  EffortLag lag{with->theta[n], std::sqrt(with->variance[n]), no_change(found), std::move(slope)};
   const Eigen::VectorXd change = with->theta.head(n) - without->theta;
   const Eigen::VectorXd of_noise = (with->variance.head(n) - without->variance).cwiseAbs();
   for (Eigen::Index j = 0; j < n; ++j)

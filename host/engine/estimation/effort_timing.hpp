@@ -18,6 +18,7 @@ struct EffortLag {
   // Of the parameters of each balance (linear, then nonlinear): by how much their estimates would change with the lag
   // corrected, where noise does not explain the change; zero where it does.
   std::vector<Eigen::VectorXd> change;
+  Eigen::VectorXd slope;  // of the effort in time, N m/s: what a second of lag adds to the motor's balance, by sample
 
   bool is_certain() const;  // three standard errors
 };

@@ -9,7 +9,6 @@
 #include "host/common/signals/differentiate.hpp"
 #include "host/common/signals/fused_velocity.hpp"
 #include "host/common/signals/kalman_smoother.hpp"
-#include "host/common/signals/quantum.hpp"
 
 namespace flexspline::estimation {
 
@@ -183,7 +182,7 @@ bool is_long_enough(const std::vector<Segment>& segments) {
 SideMotion side_from_position(const Experiment& e, const SideColumns& columns, const ZeroPhaseFilter& filter,
                               Derivatives derivatives) {
   const std::vector<double>& position = e[columns.position];
-  const std::optional<double> quantum = columns.step ? columns.step : signals::quantum_of(position);
+  const std::optional<double> quantum = columns.step ? columns.step : data::step_of(e, columns.position);
   if (derivatives == Derivatives::kalman && is_long_enough(e.segments))
     if (auto smoothed = smoothed_side(position, quantum, e)) return std::move(*smoothed);
   SideMotion side = motion_from_position(position, e.segments, filter, e.sample_s);

@@ -260,6 +260,27 @@ Eigen::MatrixXd RegressorEvaluator::unit_columns(const Terms& terms, const std::
   return filtered_columns(refs.size(), Fill{&unit_columns, fill});
 }
 
+Eigen::MatrixXd RegressorEvaluator::unfiltered_columns(const Terms& terms,
+                                                       const std::vector<ParameterRef>& refs) const {
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows(), std::ssize(refs));
+  std::vector<effects::Inputs<Real>> inputs;
+  for (const RowRange& range : ranges_) {
+    const Record& r = prepared_->records[range.record];
+    inputs.clear();
+    for (const std::size_t k : r.rows[index(balance_)].samples) inputs.push_back(r.inputs[k]);
+    for (std::size_t j = 0; j < refs.size(); ++j) {
+      const Term& term = terms[refs[j].term];
+      const std::vector<double> natural = catalogue::natural(*term.entry, unit_values(term, refs[j].parameter));
+      const std::span torque(columns.col(static_cast<Eigen::Index>(j)).data() + range.first, inputs.size());
+      const auto share_here = [&](Balance to) { return share_of(term, r, to); };
+      add_by_shares(term, share_here, torque, [&](Balance to, double* sum) {
+        term.entry->real.torque(natural.data(), prepared_->constants, to, inputs, sum);
+      });
+    }
+  }
+  return columns;
+}
+
 Eigen::MatrixXd RegressorEvaluator::slopes(const Terms& terms, const std::vector<std::size_t>& of,
                                            const std::vector<ParameterRef>& nonlinear) const {
   std::vector<std::vector<Jet>> all;

@@ -43,6 +43,9 @@ class RegressorEvaluator {
   // Torque per unit of linear parameters, one column each, with nonlinear parameters, shifts and modulations as in
   // `terms`. N m per unit. What is asked for together is filtered together, which costs less than half.
   Eigen::MatrixXd unit_columns(const Terms& terms, const std::vector<ParameterRef>& refs) const;
+  // The same, not filtered, of terms without memory whose inputs no other changes: computed at the samples alone, they
+  // cost a tenth and serve to compare sizes.
+  Eigen::MatrixXd unfiltered_columns(const Terms& terms, const std::vector<ParameterRef>& refs) const;
   // Slopes by nonlinear parameters of the torque of the terms `of`, at the linear parameters of `terms`.
   Eigen::MatrixXd slopes(const Terms& terms, const std::vector<std::size_t>& of,
                          const std::vector<ParameterRef>& nonlinear) const;

@@ -11,7 +11,6 @@
 #include "host/common/signals/cutoff.hpp"
 #include "host/common/signals/differentiate.hpp"
 #include "host/common/signals/differentiators.hpp"
-#include "host/common/signals/quantum.hpp"
 
 namespace flexspline::measurement {
 namespace {
@@ -161,7 +160,7 @@ std::vector<DerivativeComparison> compare_derivatives(const data::Dataset& datas
       for (const data::Segment& s : e.segments) longest = std::max(longest, s.last - s.first);
       if (longest < kFewestSamples) return;
       std::optional<double> step = data::encoder_step(counts, dataset.drive.axis.value_or(data::Axis::rotary));
-      if (!step) step = signals::quantum_of(e[column]);
+      if (!step) step = data::step_of(e, column);
       all.push_back(compared(e, column, velocity, step, options));
     };
     take(options.motor, Column::motor_position, Column::motor_velocity, e.encoder_counts);

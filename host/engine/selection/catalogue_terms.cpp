@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "host/common/algebra/decompositions.hpp"
 #include "host/common/numbers/quantile.hpp"
+#include "host/common/signals/butterworth.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
 #include "host/engine/selection/candidate_models.hpp"
@@ -118,6 +120,25 @@ std::vector<Group> groups_of(const std::vector<Extension>& extensions) {
   return groups;
 }
 
+// One block of columns for each of some sources of torque, from what `make` gives for all their parameters.
+template <class Make>
+std::vector<Eigen::MatrixXd> made_together(std::span<const Extension> group, const Make& make) {
+  Terms terms = group.front().terms;
+  std::vector<ParameterRef> refs;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    if (i > 0) terms.push_back(group[i].added());
+    for (const ParameterRef& ref : group[i].parameters()) refs.push_back({terms.size() - 1, ref.parameter});
+  }
+  const Eigen::MatrixXd all = make(terms, refs);
+  std::vector<Eigen::MatrixXd> made;
+  Eigen::Index at = 0;
+  for (const Extension& one : group) {
+    made.emplace_back(all.middleCols(at, std::ssize(one.parameters())));
+    at += made.back().cols();
+  }
+  return made;
+}
+
 // One block of columns for each extension of a group.
 std::vector<Eigen::MatrixXd> columns_of(std::span<const Extension> group, const DirectedData& from) {
   const Extension& e = group.front();
@@ -126,20 +147,9 @@ std::vector<Eigen::MatrixXd> columns_of(std::span<const Extension> group, const 
     return {from.data.nonlinear_columns(e.terms, on, e.parameters())};
   }
   if (e.is_of_effort()) return {from_model_current(from, e.entry, e.parameters())};
-  Terms terms = e.terms;
-  std::vector<ParameterRef> refs;
-  for (std::size_t i = 0; i < group.size(); ++i) {
-    if (i > 0) terms.push_back(group[i].added());
-    for (const ParameterRef& ref : group[i].parameters()) refs.push_back({terms.size() - 1, ref.parameter});
-  }
-  const Eigen::MatrixXd all = from.data.evaluator().unit_columns(terms, refs);
-  std::vector<Eigen::MatrixXd> made;
-  Eigen::Index at = 0;
-  for (const Extension& one : group) {
-    made.emplace_back(all.middleCols(at, std::ssize(one.parameters())));
-    at += made.back().cols();
-  }
-  return made;
+  return made_together(group, [&](const Terms& terms, const std::vector<ParameterRef>& refs) {
+    return from.data.evaluator().unit_columns(terms, refs);
+  });
 }
 
 // The columns of extensions, made on all cores.
@@ -321,22 +331,55 @@ void add_values_near_best(const TableBuilder& builder, const LeftByModel& left, 
   }
 }
 
-// Which extensions compete: of waves over the angle, of each effect and of placebos likewise, the orders that take most
-// off what the model leaves of all data. The others would cost most of the time.
-std::vector<std::uint8_t> with_largest_waves(const std::vector<Extension>& extensions,
-                                             const std::vector<Eigen::MatrixXd>& columns, const TableBuilder& builder,
-                                             const LeftByModel& left) {
-  std::vector<std::uint8_t> kept(extensions.size(), 1);
-  std::map<std::pair<const catalogue::Entry*, bool>, std::vector<std::pair<double, std::size_t>>> waves;
-  for (std::size_t i = 0; i < extensions.size(); ++i) {
-    const Extension& e = extensions[i];
-    if (!e.order) continue;
-    waves[{&e.entry, e.is_placebo()}].emplace_back(-left.taken_by(columns[i]), i);
+// The squares that each of some waves takes off what the model leaves. The waves are not filtered, which costs most of
+// the time of their columns: the filter's gain at the frequency that they have at each sample takes its place.
+std::vector<double> taken_by_waves(std::span<const Extension> waves, const TableBuilder& builder, const Motion& motion,
+                                   const LeftByModel& left) {
+  const DirectedData& from = builder.sign;
+  const Eigen::VectorXd turns_per_s = from.at_rows([&](const estimation::Record& r, std::size_t k) {
+    return r.inputs.velocity.empty() ? 0.0 : std::abs(r.inputs.velocity_at(k)) / motion.turn;
+  });
+  const std::vector<Eigen::MatrixXd> columns =
+      made_together(waves, [&](const Terms& terms, const std::vector<ParameterRef>& refs) {
+        return from.data.evaluator().unfiltered_columns(terms, refs);
+      });
+  std::vector<double> taken;
+  for (std::size_t i = 0; i < waves.size(); ++i) {
+    const Eigen::ArrayXd over_cutoff = turns_per_s.array() * (*waves[i].order / builder.table.highest_hz);
+    // Of a Butterworth filter of this order, forwards and backwards.
+    const Eigen::ArrayXd gain = 1.0 / (1.0 + over_cutoff.pow(2 * signals::ZeroPhaseFilter::kDefaultOrder));
+    taken.push_back(left.taken_by(gain.matrix().asDiagonal() * columns[i]));
   }
-  for (auto& [effect, list] : waves) {
-    std::sort(list.begin(), list.end());
-    for (std::size_t k = builder.policy.orders_resampled; k < list.size(); ++k) kept[list[k].second] = 0;
+  return taken;
+}
+
+// Leaves out, of waves over the angle, all but those that take most off what the model leaves of all data, of each
+// effect and of placebos likewise: the others would cost most of the time. Those of effects are listed in the table.
+std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensions, const TableBuilder& builder,
+                                          const Motion& motion, const LeftByModel& left) {
+  std::map<std::pair<const catalogue::Entry*, bool>, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (extensions[i].order) places[{&extensions[i].entry, extensions[i].is_placebo()}].push_back(i);
+  std::vector<std::vector<std::size_t>> lists;
+  for (auto& [effect, list] : places) lists.push_back(std::move(list));
+  std::vector<double> taken(extensions.size(), 0.0);
+  estimation::in_parallel(lists.size(), [&](std::size_t l) {
+    std::vector<Extension> waves;
+    for (const std::size_t i : lists[l]) waves.push_back(extensions[i]);
+    const std::vector<double> squares = taken_by_waves(waves, builder, motion, left);
+    for (std::size_t k = 0; k < squares.size(); ++k) taken[lists[l][k]] = squares[k];
+  });
+  std::vector<std::uint8_t> is_kept(extensions.size(), 1);
+  for (std::vector<std::size_t>& list : lists) {
+    std::ranges::stable_sort(list, std::greater{}, [&](std::size_t i) { return taken[i]; });
+    for (std::size_t k = builder.policy.orders_resampled; k < list.size(); ++k) is_kept[list[k]] = 0;
   }
+  std::vector<Extension> kept;
+  for (std::size_t i = 0; i < extensions.size(); ++i)
+    if (is_kept[i] != 0)
+      kept.push_back(extensions[i]);
+    else if (!extensions[i].is_placebo())
+      builder.table.smaller_waves.emplace_back(&extensions[i].entry, *extensions[i].order);
   return kept;
 }
 
@@ -355,25 +398,21 @@ void exclude_phase_errors(RegressorTable& table, std::size_t first) {
 }  // namespace
 
 void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
-  std::vector<Extension> extensions = extensions_of(builder, motion);
-  std::vector<Eigen::MatrixXd> sign = columns_of_all(extensions, builder.sign);
   const LeftByModel left(builder);
+  std::vector<Extension> extensions = with_largest_waves(extensions_of(builder, motion), builder, motion, left);
+  std::vector<Eigen::MatrixXd> sign = columns_of_all(extensions, builder.sign);
   add_values_near_best(builder, left, extensions, sign);
-  const std::vector<std::uint8_t> kept = with_largest_waves(extensions, sign, builder, left);
   std::vector<Extension> directed;
-  for (std::size_t i = 0; i < extensions.size(); ++i)
-    if (builder.presliding && kept[i] != 0 && extensions[i].reads_direction()) directed.push_back(extensions[i]);
+  for (const Extension& e : extensions)
+    if (builder.presliding && e.reads_direction()) directed.push_back(e);
   std::vector<Eigen::MatrixXd> presliding;
   if (builder.presliding) presliding = columns_of_all(directed, *builder.presliding);
   auto next = presliding.begin();
   const std::size_t first = builder.table.terms.size();
   for (std::size_t i = 0; i < extensions.size(); ++i)
-    if (kept[i] != 0)
-      add_term(builder, extensions[i],
-               {std::move(sign[i]),
-                builder.presliding && extensions[i].reads_direction() ? std::move(*next++) : Eigen::MatrixXd()});
-    else if (!extensions[i].is_placebo())
-      builder.table.smaller_waves.emplace_back(&extensions[i].entry, *extensions[i].order);
+    add_term(builder, extensions[i],
+             {std::move(sign[i]),
+              builder.presliding && extensions[i].reads_direction() ? std::move(*next++) : Eigen::MatrixXd()});
   exclude_phase_errors(builder.table, first);
 }
 

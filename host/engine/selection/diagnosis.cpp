@@ -25,6 +25,7 @@
 #include "host/engine/selection/output_angle_period.hpp"
 #include "host/engine/selection/presliding_fit.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
+#include "host/engine/selection/record_inertia.hpp"
 #include "host/engine/selection/remainder.hpp"
 #include "host/engine/selection/resampling.hpp"
 #include "host/engine/selection/searched_balance.hpp"
@@ -248,6 +249,8 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     for (RegressionProblem& data : base->data) data = RegressionProblem(base->prepared, data.balance());
   std::vector<SearchedBalance> all = search_balances(*base, dataset, options, result);
   const ChosenBalance chosen = choose_balance(all, *base, dataset, options, result);
+  if (chosen.motor)
+    if (const auto own = inertia_by_record(*base, chosen.motor->search)) result.warnings.push_back(inertia_text(*own));
   SearchedBalance& balance = *chosen.balance;
   const bool by_resampling = chosen.method == Method::resampling;
   const CandidateFit* likeliest = name_effects(all, chosen, options, model.drive.axis, result);

@@ -31,12 +31,13 @@ std::vector<SampleState> states_of(const RegressorTable& table, const Run& run, 
     if (!std::isinf(v) && (std::abs(v) <= kPolicy.visible_velocity || v * before < 0.0))
       set(k - reach, k + reach + 1, SampleState::near_reversal);
   }
-  // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion.
+  // Where the axis is at rest, friction takes any value up to its limit, whatever law holds in motion: what the filter
+  // makes of that says nothing.
   const auto rest_rows = std::max<Eigen::Index>(2, std::lround(kPolicy.rest_periods / (cutoff_hz * run.row_s)));
   for (Eigen::Index k = 0; k < n;) {
     Eigen::Index end = k;
     while (end < n && std::abs(table.velocity_over_noise[run.first + end]) <= kPolicy.visible_velocity) ++end;
-    if (end - k >= rest_rows) set(k - reach / 2, end + reach / 2, SampleState::at_rest);
+    if (end - k >= rest_rows) set(k - reach, end + reach, SampleState::at_rest);
     k = std::max(end, k + 1);
   }
   return states;

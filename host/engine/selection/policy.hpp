@@ -36,9 +36,10 @@ struct SelectionPolicy {
   // model leaves of a measured torque is noise of its sensor.
   double torque_noise_share = 0.5;
   // A motor that moves by that many standard errors of its velocity is in motion; that many periods of the cut-off
-  // without are rest.
+  // without are rest: half of what the filter passes of a sample is of a quarter of a period about it. With half a
+  // period ideal dry friction was taken for presliding in 9 of 144 simulated machines that stop between their moves.
   double visible_velocity = 3.0;
-  double rest_periods = 0.5;
+  double rest_periods = 0.25;
 
   // Resampling: complementary pairs (Shah and Samworth 2013, who use 50).
   std::size_t blocks = 24;

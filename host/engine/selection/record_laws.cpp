@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "host/engine/estimation/effort_timing.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/model_projection.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
@@ -27,6 +28,31 @@ std::pair<double, double> value_in(const Estimate& parameter, const std::string&
   const auto at = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.name == record; });
   if (at == values.end() || !at->value || !at->std) return {0.0, std::numeric_limits<double>::infinity()};
   return {*at->value, *at->std * *at->std};
+}
+
+// A lag of the effort that is certain changes what each record says by as much as its motion makes of it, which would
+// look like a law of speed.
+void take_lag_off(const estimation::Identification& base, const RegressionProblem& data, RecordFriction& friction) {
+  if (friction.parameters.empty()) return;
+  const std::optional<estimation::EffortLag> lag = estimation::effort_lag(base);
+  if (!lag || !lag->is_certain() || lag->slope.size() != data.rows()) return;
+  const auto on_balance = estimation::terms_on(base.terms, data.balance(), base.prepared.output_signals);
+  const std::vector<estimation::ParameterRef> linear = estimation::free_linear_parameters(base.terms, on_balance);
+  const Eigen::MatrixXd columns = data.columns(base.terms, linear);
+  for (std::size_t i = 0; i < friction.records.size(); ++i) {
+    const RowRange& range = friction.records[i];
+    const estimation::LinearFit per_second =
+        estimation::least_squares(columns.middleRows(range.first, range.size()),
+                                  lag->slope.segment(range.first, range.size()), Eigen::VectorXd::Ones(range.size()));
+    for (std::size_t j = 0; j < friction.parameters.size(); ++j) {
+      const auto at = std::ranges::find(linear, friction.parameters[j]->ref);
+      if (at == linear.end()) continue;
+      const double change_per_s = per_second.theta[at - linear.begin()];
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+      friction.values.theta(row, column) -= lag->lag_s * change_per_s;
+      friction.values.variance(row, column) += std::pow(lag->std_s * change_per_s, 2);
+    }
+  }
 }
 
 }  // namespace
@@ -81,6 +107,7 @@ RecordFriction friction_by_record(const estimation::Identification& base, const 
   }
   theta.conservativeResize(static_cast<Eigen::Index>(friction.records.size()), parameters);
   variance.conservativeResize(theta.rows(), parameters);
+  take_lag_off(base, data, friction);
   return friction;
 }
 

@@ -1,6 +1,7 @@
 #include "host/engine/selection/wald_test.hpp"
 
 #include <algorithm>
+#include <string>
 
 #include "host/common/numbers/distributions.hpp"
 #include "host/engine/selection/effect_names.hpp"
@@ -34,28 +35,47 @@ bool is_confirmed_by_held_out(const Diagnosis& result, const NamedEffect& name) 
 
 namespace {
 
-// The candidate of a name whose values do not differ from zero; null where they do, where no test exists, or where
-// experiments that are held out confirm the name.
-Candidate* insignificant(Diagnosis& result, const NamedEffect& name) {
+Candidate* candidate_of_name(Diagnosis& result, const NamedEffect& name) {
   const auto at = std::find_if(result.candidates.begin(), result.candidates.end(),
                                [&](const Candidate& c) { return name_of(c) == name; });
-  if (at == result.candidates.end() || is_confirmed_by_held_out(result, name)) return nullptr;
-  const std::optional<double> p = wald_p_value(*at);
-  return p && *p > kPolicy.wald_p_value ? &*at : nullptr;
+  return at == result.candidates.end() ? nullptr : &*at;
+}
+
+// Why a name is taken back; empty where it stays. An axis that sticks is confirmed by held-out experiments, too, as it
+// sticks there as well.
+std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
+  const Candidate* const candidate = candidate_of_name(result, name);
+  if (!candidate) return {};
+  if (has_unresolved_travel(*candidate))
+    return "the interval of its travel holds zero: an axis that only sticks looks like it";
+  if (is_confirmed_by_held_out(result, name)) return {};
+  const std::optional<double> p = wald_p_value(*candidate);
+  return p && *p > kPolicy.wald_p_value ? "its values do not differ from zero beyond their intervals" : "";
 }
 
 }  // namespace
 
+bool has_unresolved_travel(const Candidate& candidate) {
+  const catalogue::Entry* const entry = catalogue::find(candidate.effect);
+  return entry && entry->is_presliding() &&
+         std::ranges::any_of(candidate.parameters, [&](const estimation::Estimate& e) {
+           constexpr double kHalfWidth = 1.96;  // of a 95 % interval, in standard errors
+           return entry->parameters[e.ref.parameter].limit == effects::Limit::travel && !e.fixed && e.std &&
+                  e.value < kHalfWidth * *e.std;
+         });
+}
+
 void take_back_insignificant(Diagnosis& result) {
-  const auto is_insignificant = [&](const NamedEffect& name) { return insignificant(result, name) != nullptr; };
+  const auto is_insignificant = [&](const NamedEffect& name) { return !why_insignificant(result, name).empty(); };
   if (result.verdict == Verdict::confusable_effects &&
       !std::all_of(result.named.begin(), result.named.end(), is_insignificant))
     return;
   std::erase_if(result.named, [&](const NamedEffect& name) {
-    Candidate* const candidate = insignificant(result, name);
-    if (!candidate) return false;
+    const std::string why = why_insignificant(result, name);
+    if (why.empty()) return false;
+    Candidate* const candidate = candidate_of_name(result, name);
     candidate->admissible = false;
-    candidate->why_not = "its values do not differ from zero beyond their intervals";
+    candidate->why_not = why;
     if (result.resampling && result.resampling->decides)
       result.possible.push_back({{name}, candidate->why_not, std::nullopt, std::nullopt});
     return true;

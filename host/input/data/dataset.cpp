@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "host/common/signals/quantum.hpp"
 #include "host/input/data/units.hpp"
 
 namespace flexspline::data {
@@ -33,6 +34,12 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 }  // namespace
+
+std::optional<double> step_of(const Experiment& experiment, Column column) {
+  const std::optional<double>& as_read = experiment.steps_as_read[static_cast<std::size_t>(column)];
+  if (!as_read) return signals::quantum_of(experiment[column]);
+  return *as_read > 0.0 ? as_read : std::nullopt;
+}
 
 std::optional<double> encoder_step(const std::optional<double>& counts, Axis axis) {
   if (!counts || !(*counts > 0.0)) return std::nullopt;

@@ -65,6 +65,8 @@ struct Experiment {
   std::vector<double> time_s;
   std::array<std::vector<double>, kColumns> columns;      // empty: not measured
   std::array<std::optional<double>, kColumns> noise_std;  // stated by the user, in the column's unit
+  // Smallest steps that were found as the columns were read, 0 where there are none; see step_of().
+  std::array<std::optional<double>, kColumns> steps_as_read;
   std::vector<Segment> segments;
   // Samples that must not be used (clipped, for one), as found by `load`; same length as time_s.
   std::vector<std::uint8_t> masked;
@@ -121,6 +123,10 @@ void merge_facts(DriveFacts& ours, const DriveFacts& theirs, const FactSources& 
 
 // Smallest step of an encoder with so many counts, rad or m; nothing where the counts are not stated.
 std::optional<double> encoder_step(const std::optional<double>& counts, Axis axis);
+
+// Smallest step of a column, where all its steps are multiples of one: as it was read, because resampling and other
+// units hide it; else as the values are.
+std::optional<double> step_of(const Experiment& experiment, Column column);
 
 // Reads any number of files, folders and dataset.tomls. A folder with a dataset.toml is read by that file, one
 // without by its CSV and MAT files in the order of their names; a dataset.toml names which files belong and how columns

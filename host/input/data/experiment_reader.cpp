@@ -9,6 +9,7 @@
 #include <map>
 #include <numeric>
 
+#include "host/common/signals/quantum.hpp"
 #include "host/input/data/checks.hpp"
 #include "host/input/data/time_base.hpp"
 
@@ -222,7 +223,12 @@ class ExperimentReader {
     const std::vector<double>& theirs = table_.columns[planned.column_index];
     std::vector<double>& ours = experiment_[planned.column];
     ours.reserve(rows_.size());
-    for (const std::size_t row : rows_) ours.push_back((*conversion)(theirs[row]));
+    std::vector<double> as_read;
+    as_read.reserve(rows_.size());
+    for (const std::size_t row : rows_) as_read.push_back(theirs[row]);
+    experiment_.steps_as_read[static_cast<std::size_t>(planned.column)] =
+        std::abs(conversion->factor) * signals::quantum_of(as_read).value_or(0.0);
+    for (const double value : as_read) ours.push_back((*conversion)(value));
   }
 
   void take_time() {

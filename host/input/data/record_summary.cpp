@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "host/common/numbers/quantile.hpp"
-#include "host/common/signals/quantum.hpp"
 #include "host/input/data/period.hpp"
 
 namespace flexspline::data {
@@ -38,7 +37,7 @@ SignalSummary signal_of(const Experiment& e, Column column, Axis axis) {
   s.low = *low;
   s.high = *high;
   s.noise_std = noise_std(x, e.segments);
-  s.quantum = signals::quantum_of(x);
+  s.quantum = step_of(e, column);
   s.stated_noise_std = e.noise_std[static_cast<std::size_t>(column)];
   return s;
 }
