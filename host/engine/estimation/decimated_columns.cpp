@@ -21,6 +21,7 @@ RegressorEvaluator RegressorEvaluator::decimated() const {
   few.drive = prepared_->drive;
   few.output_signals = prepared_->output_signals;
   few.effort_is_current = prepared_->effort_is_current;
+  few.nonlinear_in_measured_current = prepared_->nonlinear_in_measured_current;
   few.rotary = prepared_->rotary;
   few.records.resize(prepared_->records.size());
   RegressorEvaluator thin = *this;

@@ -21,10 +21,12 @@ double passed_on(const PreparedData& prepared, const Record& r, std::size_t samp
 }  // namespace
 
 bool reads_modelled_current(const Term& term) {
-  if (term.entry->definition) return false;
-  const bool is_nonlinear =
-      term.entry->info->reads == effects::kCurrent && term.entry->count(effects::Kind::linear) > 0;
-  return term.entry->has_state || is_nonlinear;
+  return !term.entry->definition && (term.entry->has_state || is_nonlinear_in_current(term));
+}
+
+bool is_nonlinear_in_current(const Term& term) {
+  return !term.entry->definition && term.entry->info->reads == effects::kCurrent &&
+         term.entry->count(effects::Kind::linear) > 0;
 }
 
 void take_modelled_current(PreparedData& prepared, const Terms& terms) {

@@ -10,6 +10,8 @@ namespace flexspline::estimation {
 // current averages its noise, and a coefficient of a nonlinear function of it is estimated from noise that is in the
 // effort, too. A limit of the current shows in the measured one alone.
 bool reads_modelled_current(const Term& term);
+// Of these, the torque of a nonlinear function of the current, with a linear coefficient.
+bool is_nonlinear_in_current(const Term& term);
 
 // Gives the records the current that `terms`, with values, make of motion and load, A, for effects with a memory of the
 // current, or nonlinear in it (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no

@@ -53,8 +53,9 @@ unsigned reads_of(const Terms& terms, const Term& term) {
   return term.entry->info->reads;
 }
 
-unsigned current_for(const Term& term) {
-  return reads_modelled_current(term) ? RecordSignals::kModelledCurrent : 0;
+unsigned current_for(const PreparedData& prepared, const Term& term) {
+  const bool is_measured = prepared.nonlinear_in_measured_current && is_nonlinear_in_current(term);
+  return reads_modelled_current(term) && !is_measured ? RecordSignals::kModelledCurrent : 0;
 }
 
 // Calls add(balance, sum) for each balance that the term acts on, and weighs the sum by share(balance).
@@ -99,7 +100,7 @@ bool RegressorEvaluator::change_inputs(const Terms& terms, const Term& term, con
   if (!any) return false;
   const auto constants = lifted<typename N::Parameter>(prepared_->constants);
   changed.reserve(r.inputs.size());
-  r.inputs.all(RecordSignals::kAll | current_for(term)).each_block([&](std::size_t, auto block) {
+  r.inputs.all(RecordSignals::kAll | current_for(*prepared_, term)).each_block([&](std::size_t, auto block) {
     for (const auto& in : block) changed.push_back(catalogue::lifted<N>(in));
   });
   bool turned = false;
@@ -140,7 +141,7 @@ void RegressorEvaluator::add_torque(const Terms& terms, const Term& term,
       functions.torque(natural.data(), constants, to, changed, sum);
     else
       functions.torque_of_plain(natural.data(), constants, to,
-                                r.inputs.all(term.entry->info->reads | current_for(term)), sum);
+                                r.inputs.all(term.entry->info->reads | current_for(*prepared_, term)), sum);
   });
 }
 

@@ -103,6 +103,22 @@ std::vector<SearchedBalance> search_balances(estimation::Identification& base, c
   return all;
 }
 
+// An effect that is nonlinear in the current, and passes with the current that the model makes of the motion, is no
+// noise of the measured one: its values, and what it takes off, come from that. The model lacks the effect, and so
+// makes a current that is too small where the effect is strong; a limit of the current would do better then.
+bool take_measured_current(const std::vector<SearchedBalance>& all, estimation::Identification& base) {
+  const auto passes_by_model = [](const CandidateFit& candidate) {
+    return passes(candidate) && estimation::is_nonlinear_in_current(candidate.fit.terms.back());
+  };
+  if (!base.prepared.effort_is_current || std::ranges::none_of(all, [&](const SearchedBalance& e) {
+        return std::ranges::any_of(e.candidates, passes_by_model);
+      }))
+    return false;
+  base.prepared.nonlinear_in_measured_current = true;
+  for (RegressionProblem& data : base.data) data = RegressionProblem(base.prepared, data.balance());
+  return true;
+}
+
 // The balance that the verdict is about, and the method that names its effects.
 struct ChosenBalance {
   SearchedBalance* balance = nullptr;
@@ -248,6 +264,11 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (std::ranges::any_of(base->terms, estimation::reads_modelled_current))
     for (RegressionProblem& data : base->data) data = RegressionProblem(base->prepared, data.balance());
   std::vector<SearchedBalance> all = search_balances(*base, dataset, options, result);
+  if (take_measured_current(all, *base)) {
+    result.disturbances.clear();
+    result.warnings = base->warnings;
+    all = search_balances(*base, dataset, options, result);
+  }
   const ChosenBalance chosen = choose_balance(all, *base, dataset, options, result);
   if (chosen.motor)
     if (const auto own = inertia_by_record(*base, chosen.motor->search)) result.warnings.push_back(inertia_text(*own));

@@ -18,6 +18,7 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
   prepared = estimation::prepare_with(experiments, fitted.model.drive, fitted.prepared.pipeline, ready);
   prepared.output_signals = fitted.prepared.output_signals;
   estimation::take_modelled_current(prepared, fitted.terms);
+  prepared.nonlinear_in_measured_current = fitted.prepared.nonlinear_in_measured_current;
   data = std::make_unique<RegressionProblem>(prepared, balance);
   if (data->empty()) data.reset();
 }
