@@ -150,7 +150,7 @@ TEST_F(RegressorEvaluatorOfSines, AColumnIsTheTorqueOfOneUnit) {
 TEST_F(RegressorEvaluatorOfSines, AnUnfilteredColumnIsTheLawOfTheSignalsAtTheSamples) {
   const Terms terms = terms_with({"viscous_friction", "quadratic_drag"});
   const Eigen::MatrixXd columns = evaluator_->unfiltered_columns(terms, {{0, 0}, {1, 0}});
-  const Eigen::ArrayXd velocity = evaluator_->signal_at_rows(terms, effects::Variable::motor_velocity).array();
+  const Eigen::ArrayXd velocity = evaluator_->signal_at_rows(terms, effects::Variable::velocity).array();
   EXPECT_LT((columns.col(0).array() - velocity).abs().maxCoeff(), 1e-12);
   EXPECT_LT((columns.col(1).array() - velocity * velocity.abs()).abs().maxCoeff(), 1e-9);
 }
