@@ -129,14 +129,17 @@ TEST(TimeBase, AHeldCommandIsHeldInResampling) {
   for (const double amps : e[Column::current]) EXPECT_TRUE(amps == 1.0 || amps == 2.0) << amps;
 }
 
-TEST(TimeBase, TheStepOfAnEncoderIsKnownAlsoWhereSamplesAreResampledOrInOtherUnits) {
+// In degrees, of which the table of columns makes radians.
+TEST(TimeBase, TheStepOfAnEncoderIsKnownAlsoWhereSamplesAreResampledAndInOtherUnits) {
   constexpr double kStep_deg = 360.0 / 65536.0;
-  const auto encoder_deg = [](double t) {
-    return kStep_deg * std::floor(0.5 * std::sin(kOmega_rad_s * t) / kStep_deg);
-  };
+  const auto encoder = [](double t) { return kStep_deg * std::floor(0.5 * std::sin(kOmega_rad_s * t) / kStep_deg); };
   const TestFolder folder;
-  const Dataset data = load({folder.write(
-      "uneven.csv", csv_of(jittered_times(2000, 0.1), {{"current_a", current}, {"motor_position_deg", encoder_deg}}))});
+  folder.write("uneven.csv", csv_of(jittered_times(2000, 0.1), {{"current_a", current}, {"angle", encoder}}));
+  folder.write(
+      "dataset.toml",
+      "format = \"flexspline-dataset/1\"\n[columns]\nmotor_position_rad = { from = \"angle\", unit = \"deg\" }\n"
+      "[[experiment]]\nfile = \"uneven.csv\"\n");
+  const Dataset data = load({folder.path()});
   const double step = kStep_deg * std::numbers::pi / 180.0;
   EXPECT_NEAR(step_of(data.experiments[0], Column::motor_position).value(), step, 1e-3 * step);
 }
