@@ -137,7 +137,7 @@ TEST(TimeBase, TheStepOfAnEncoderIsKnownAlsoWhereSamplesAreResampledAndInOtherUn
   folder.write("uneven.csv", csv_of(jittered_times(2000, 0.1), {{"current_a", current}, {"angle", encoder}}));
   folder.write(
       "dataset.toml",
-      "format = \"flexspline-dataset/1\"\n[columns]\nmotor_position_rad = { from = \"angle\", unit = \"deg\" }\n"
+      "format = \"flexspline-dataset/1\"\n[columns]\nmotor_position_rad = { source = \"angle\", unit = \"deg\" }\n"
       "[[experiment]]\nfile = \"uneven.csv\"\n");
   const Dataset data = load({folder.path()});
   const double step = kStep_deg * std::numbers::pi / 180.0;
