@@ -18,7 +18,7 @@ std::vector<Resampling::FoundTerm> presliding_of(const std::vector<Resampling::F
 }
 
 TEST(UnresolvedPresliding, ThatSubsamplesChooseWithATravelOfAFewEncoderStepsIsLeftOpenAsTheAxisMayStick) {
-  const data::Dataset dataset = tests::swinging_axis(0.02, 0.006);
+  const data::Dataset dataset = tests::swinging_axis(0.005, 0.0015);
   const auto fitted = estimation::identify(dataset, tests::plain_model(), {});
   const std::vector<const data::Experiment*> all = {&dataset.experiments[0], &dataset.experiments[1]};
   const Resampling hidden = resample(all, fitted->model.drive, fitted->terms);

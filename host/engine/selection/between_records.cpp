@@ -75,28 +75,9 @@ void take_values(const MetaRegression& fit, const Law& law, double p_value, std:
       100.0 * fit.explained_share, records, p_value);
 }
 
-// Error on held-out experiments with a law over that without it; nothing where none are held out.
-std::optional<double> held_out_ratio(const SearchedBalance& motor, const Law& law) {
-  if (!motor.held_out || !motor.held_out->data) return std::nullopt;
-  return motor.held_out->rmse(law.candidate->fit.terms) /
-         std::max(motor.held_out->rmse(motor.search.base.terms), 1e-300);
-}
-
-void name_likeliest(const Possible& best, double p_value, std::size_t records, const SearchedBalance& motor,
-                    Diagnosis& result) {
+void name_likeliest(const Possible& best, double p_value, std::size_t records, Diagnosis& result) {
   for (const auto& [fit, law] : best) {
     const std::string name(law->candidate->model.entry->name());
-    // A few records differ in more than their speeds: where others are held out, they have to confirm the law.
-    const std::optional<double> ratio = held_out_ratio(motor, *law);
-    if (ratio && *ratio * *ratio > 1.0 - kPolicy.line_share) {
-      result.possible.push_back({{{name, std::nullopt}},
-                                 fmt::format("it explains how friction differs between {} records (p = {:.2g}), but "
-                                             "experiments that are held out do not confirm it",
-                                             records, p_value),
-                                 std::nullopt,
-                                 ratio});
-      continue;
-    }
     const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
       return c.effect == name && !c.order && c.balance == estimation::Balance::motor;
     });
@@ -158,7 +139,7 @@ void name_between_records(const estimation::Identification& base, const estimati
   const auto permutations = static_cast<int>(20.0 / kPolicy.trend_p_value);
   const double p_value = permutation_p_value(own.values, added, {whole}, permutations, 1);
   if (p_value <= kPolicy.trend_p_value)
-    return name_likeliest(possible(own, all, whole), p_value, own.records.size(), motor, result);
+    return name_likeliest(possible(own, all, whole), p_value, own.records.size(), result);
   result.law_in_range = law_in_range(base, own, all, added);
   if (result.law_in_range) result.law_in_range->p_value_of_all = p_value;
 }
