@@ -130,8 +130,8 @@ struct PreparedData {
   // Without a torque motor and load are one balance, with load terms divided by the gear ratio.
   OutputSignals output_signals;
   bool effort_is_current = false;
-  bool nonlinear_in_measured_current =
-      false;  // effects that is_nonlinear_in_current() names do not read a modelled one
+  // Effects that is_nonlinear_in_current() names read the measured current, also where there is a modelled one.
+  bool nonlinear_in_measured_current = false;
   bool rotary = true;
   std::vector<const data::Experiment*> chosen_on;  // what the pipeline was chosen for; empty: it was given
   std::optional<double> slowest_law_rad_s;         // whose slow samples the mask had to leave; see prepare()

@@ -252,6 +252,8 @@ struct SelectionPolicy {
   double scaling_p_value = 1e-3;      // of an effect that scales friction by a recorded signal, for all that were tried
   double scaling_over_range = 2.0;    // of its coefficient over the range's end: to first order it comes out too large
   double shown_within_records = 0.25;  // share of the signal's variance within records from which on they show it
+  double known_inertia = 0.2;          // relative standard error up to which a record's inertia is compared
+  double inertia_errors = 5.0;         // standard errors by which two of them differ: several pairs are compared
   double trend_size = 0.03;            // of the parameter, over the records
   double least_drift = 0.01;           // relative standard deviation of friction between records that is reported
   double drift_deviance = 12.0;        // twice the log-likelihood ratio of random effects against none

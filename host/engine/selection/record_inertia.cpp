@@ -15,10 +15,6 @@ namespace {
 using estimation::Estimate;
 using estimation::RegressionProblem;
 
-double weighted_squares(const Eigen::VectorXd& residual, const Eigen::VectorXd& root_weights) {
-  return residual.cwiseProduct(root_weights).squaredNorm();
-}
-
 // The columns with one of them divided into one a record.
 Eigen::MatrixXd with_own_column(const RegressionProblem& data, const Eigen::MatrixXd& columns, Eigen::Index of) {
   const auto records = std::ssize(data.records());
@@ -31,17 +27,16 @@ Eigen::MatrixXd with_own_column(const RegressionProblem& data, const Eigen::Matr
   return own;
 }
 
-// The least and the largest value of the records that tell it within a fifth; nothing where they agree.
+// The least and the largest value of the records that know it well; nothing where they agree.
 std::optional<std::pair<double, double>> range_of(const Estimate& parameter) {
-  constexpr double kTold = 0.2, kStandardErrors = 5.0;
   std::optional<std::pair<double, double>> least, most;  // value, variance
   for (const auto& one : parameter.per_experiment) {
-    if (!one.value || !one.std || *one.std > kTold * std::abs(*one.value)) continue;
+    if (!one.value || !one.std || *one.std > kPolicy.known_inertia * std::abs(*one.value)) continue;
     const std::pair<double, double> value{*one.value, *one.std * *one.std};
     if (!least || value.first < least->first) least = value;
     if (!most || value.first > most->first) most = value;
   }
-  if (!least || most->first - least->first < kStandardErrors * std::sqrt(least->second + most->second))
+  if (!least || most->first - least->first < kPolicy.inertia_errors * std::sqrt(least->second + most->second))
     return std::nullopt;
   return std::pair{least->first, most->first};
 }
@@ -56,7 +51,7 @@ std::optional<RecordInertia> inertia_by_record(const estimation::Identification&
   const Eigen::MatrixXd columns = data.columns(base.terms, linear);
   const Eigen::VectorXd target = data.target() - data.known_torque(base.terms, on_balance);
   const Eigen::VectorXd weights = search.base.root_weights;
-  const double before = weighted_squares(estimation::least_squares(columns, target, weights).residual, weights);
+  const double before = rmse_of(estimation::least_squares(columns, target, weights).residual, weights);
   std::optional<RecordInertia> best;
   for (std::size_t j = 0; j < linear.size(); ++j) {
     const effects::ParameterInfo& info = base.terms[linear[j].term].entry->parameters[linear[j].parameter];
@@ -66,8 +61,8 @@ std::optional<RecordInertia> inertia_by_record(const estimation::Identification&
     const auto range = range_of(*estimate);
     if (!range) continue;
     const Eigen::MatrixXd own = with_own_column(data, columns, static_cast<Eigen::Index>(j));
-    const double after = weighted_squares(estimation::least_squares(own, target, weights).residual, weights);
-    const double share = 1.0 - after / std::max(before, 1e-300);
+    const double after = rmse_of(estimation::least_squares(own, target, weights).residual, weights);
+    const double share = 1.0 - std::pow(after / std::max(before, 1e-300), 2);
     if (share < kPolicy.matters_share || (best && 100.0 * share <= best->explains_percent)) continue;
     best = {fmt::format("{}.{}", estimate->id, estimate->parameter), 100.0 * share, range->first, range->second,
             estimate->unit};

@@ -13,12 +13,12 @@ namespace flexspline::selection {
 struct RecordInertia {
   std::string parameter;           // "inertia.inertia"
   double explains_percent = 0.0;   // of the squared error, with one value for each record in place of one for all
-  double least = 0.0, most = 0.0;  // of the records that tell it within a fifth
+  double least = 0.0, most = 0.0;  // of the records that know it well
   std::string unit;
 };
 
 // Of the parameters that multiply an acceleration, the one whose values by record explain most of the error; nothing
-// where that is less than a part that matters, or two records do not differ by five standard errors.
+// where that is less than a part that matters, or no two records differ beyond their errors.
 std::optional<RecordInertia> inertia_by_record(const estimation::Identification& base, const BalanceSearch& search);
 std::string inertia_text(const RecordInertia& own);  // a warning
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "host/common/numbers/distributions.hpp"
+#include "host/engine/estimation/standard_intervals.hpp"
 #include "host/engine/selection/effect_names.hpp"
 #include "host/engine/selection/policy.hpp"
 
@@ -59,9 +60,8 @@ bool has_unresolved_travel(const Candidate& candidate) {
   const catalogue::Entry* const entry = catalogue::find(candidate.effect);
   return entry && entry->is_presliding() &&
          std::ranges::any_of(candidate.parameters, [&](const estimation::Estimate& e) {
-           constexpr double kHalfWidth = 1.96;  // of a 95 % interval, in standard errors
            return entry->parameters[e.ref.parameter].limit == effects::Limit::travel && !e.fixed && e.std &&
-                  e.value < kHalfWidth * *e.std;
+                  e.value < estimation::half_width_under_bias(0.0) * *e.std;
          });
 }
 
