@@ -72,6 +72,13 @@ TEST(OutputAnglePeriod, IsUncertainOfAWeightThatHardlyTurns) {
   EXPECT_NE(candidate.why_not.find("move over a larger part of a turn"), std::string::npos) << candidate.why_not;
 }
 
+// It is named with the offset then, as one group.
+TEST(OutputAnglePeriod, IsNotAskedForWhereTheTravelMakesAnOffsetOfTheWave) {
+  const CandidateFit candidate = weight(0.002, 1.0);
+  EXPECT_FALSE(candidate.has_uncertain_period);
+  EXPECT_TRUE(passes(candidate)) << candidate.why_not;
+}
+
 // Else a ripple would be named in the place of the weight.
 TEST(OutputAnglePeriod, IsUncertainOfARippleThatIsTheSameFunctionWithoutAGear) {
   const std::vector<CandidateFit> candidates = weight_and_ripple(0.25, 2.0);

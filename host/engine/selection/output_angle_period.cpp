@@ -27,6 +27,7 @@ class SquaresLeft {
       : weights_(search.base.root_weights),
         projection_(with_offset(estimation::model_columns(*search.data, search.base.terms)), weights_),
         residual_(weighted(search.base.residual)) {}
+  double with_offset_alone() const { return residual_.squaredNorm(); }
   double with(const Eigen::MatrixXd& columns) const {
     const Eigen::MatrixXd own = weighted(columns);
     return (residual_ - own * algebra::PivotedQr(own, 1e-7).solve(residual_)).squaredNorm();
@@ -47,9 +48,13 @@ class SquaresLeft {
   Eigen::VectorXd residual_;
 };
 
-// Twice the log likelihood ratio of the period of a turn over that of half a turn. Both have as many parameters, so
-// that it is the difference of their BIC.
-double evidence_of_period(const BalanceSearch& search, const CandidateFit& candidate) {
+// Twice log likelihood ratios, of waves with as many parameters.
+struct PeriodEvidence {
+  double over_half_turn = 0.0;  // of the period of a turn: the difference of the BIC
+  bool is_wave = false;         // an offset in its place explains less
+};
+
+PeriodEvidence evidence_of_period(const BalanceSearch& search, const CandidateFit& candidate) {
   constexpr int kHalf = 2;
   const RegressionProblem& data = *search.data;
   std::vector<estimation::ParameterRef> own;
@@ -59,8 +64,13 @@ double evidence_of_period(const BalanceSearch& search, const CandidateFit& candi
   const double of_turn = left.with(data.columns(candidate.fit.terms, own));
   const double of_half = left.with(data.evaluator().wave_columns(search.base.terms, effects::Variable::output_angle,
                                                                  candidate.model.entry->info->balance, kHalf));
-  const auto samples = static_cast<double>((search.base.root_weights.array() > 0.0).count());
-  return samples / candidate.fit.autocorrelation_time * std::log(std::max(of_half, 1e-300) / std::max(of_turn, 1e-300));
+  const auto samples =
+      static_cast<double>((search.base.root_weights.array() > 0.0).count()) / candidate.fit.autocorrelation_time;
+  const auto twice_log_ratio = [&](double squares) {
+    return samples * std::log(std::max(squares, 1e-300) / std::max(of_turn, 1e-300));
+  };
+  const double penalty = static_cast<double>(own.size()) * std::log(std::max(samples, 1.0));
+  return {twice_log_ratio(of_half), twice_log_ratio(left.with_offset_alone()) >= penalty + kPolicy.positive_evidence};
 }
 
 }  // namespace
@@ -69,13 +79,14 @@ void check_output_angle_period(const BalanceSearch& search, std::vector<Candidat
   bool any = false;
   for (CandidateFit& candidate : candidates) {
     if (!is_of_one_turn(*candidate.model.entry) || !candidate.admissible) continue;
-    const double evidence = evidence_of_period(search, candidate);
-    if (evidence >= kPolicy.positive_evidence) continue;
+    const PeriodEvidence evidence = evidence_of_period(search, candidate);
+    // Over a very small travel a wave is an offset, and is named together with it.
+    if (evidence.over_half_turn >= kPolicy.positive_evidence || !evidence.is_wave) continue;
     any = true;
     const std::string why_not = fmt::format(
         "a function of the output's angle with half its period explains {} (by a score of {:.0f}): move over a larger "
         "part of a turn",
-        evidence > 0.0 ? "hardly less" : "no less", std::abs(evidence));
+        evidence.over_half_turn > 0.0 ? "hardly less" : "no less", std::abs(evidence.over_half_turn));
     for (CandidateFit& same : candidates) {
       if (&same != &candidate && !is_same_function(candidate, same)) continue;
       same.has_uncertain_period = true;

@@ -211,7 +211,9 @@ std::string verdict_in_words(const Diagnosis& d) {
           d.noise_of_some ? "known in some records only" : "not known");
     }
     case Verdict::unknown_structure:
-      return "Something is missing that no effect of the catalogue explains.";
+      return d.possible.empty() ? "Something is missing that no effect of the catalogue explains."
+                                : "Something is missing. No effect of the catalogue explains it for certain; what may "
+                                  "explain it is below.";
     case Verdict::insufficient_excitation:
       return "These data do not excite the drive enough to show it.";
   }
