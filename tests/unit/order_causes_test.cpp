@@ -199,6 +199,20 @@ TEST(OrderCauses, OrdersOfTheMotorAreThoseOfItsPolePairsAndSlots) {
   EXPECT_TRUE(orders_of_motor(get("kinematic_error"), drive_of(100.0, 7.0, 12.0)).empty());
 }
 
+TEST(OrderCauses, OrdersOfTheOutputAreThoseOfFrictionOnceAndTwiceATurnAsTheyAreWritten) {
+  const Entry& friction = get("angle_dependent_friction");
+  EXPECT_EQ(orders_of_output(friction, drive_of(120.0)), (std::vector<double>{0.00833333, 0.0166667}));
+  EXPECT_EQ(orders_of_output(friction, drive_of(5.0)), (std::vector<double>{0.2, 0.4})) << "any gear has an output";
+  const auto twice = causes("angle_dependent_friction", 0.0166667, drive_of(120.0));
+  ASSERT_EQ(twice.size(), 1U) << "far below one, orders are close to each other";
+  EXPECT_EQ(twice[0].from, "2 per output turn");
+  EXPECT_TRUE(orders_of_output(get("torque_ripple"), drive_of(100.0)).empty());
+  model::Drive screw;
+  screw.axis = data::Axis::linear;
+  screw.pitch_m.value = 0.005;
+  for (const model::Drive& drive : {drive_of(1.0, 4.0), screw}) EXPECT_TRUE(orders_of_output(friction, drive).empty());
+}
+
 TEST(OrderCauses, EveryCauseHasACheckACureAndAReference) {
   std::set<std::string_view> seen;
   const model::Drive drive = drive_of(100.0, 7.0, 12.0);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host/common/algebra/decompositions.hpp"
 #include "host/engine/estimation/variable_projection.hpp"
@@ -122,6 +123,21 @@ bool visible(const RegressionProblem& data, const Terms& terms, const catalogue:
   return true;
 }
 
+// The range of angles of the record that has the largest one, in turns of the motor.
+double largest_range_in_turns(const estimation::PreparedData& prepared) {
+  double largest = 0.0;
+  for (const estimation::Record& r : prepared.records) {
+    if (r.inputs.angle.empty()) continue;
+    double low = 1e300, high = -1e300;
+    for (std::size_t k = 0; k < r.inputs.size(); k += r.decimation) {
+      low = std::min(low, r.inputs.angle_at(k));
+      high = std::max(high, r.inputs.angle_at(k));
+    }
+    largest = std::max(largest, high - low);
+  }
+  return largest * prepared.constants.turn_angle_scale / (2.0 * std::numbers::pi);
+}
+
 // The orders with the largest waves in the residual. Waves are not filtered: the filter costs much and hardly changes
 // the ranking. Where the motor hardly turns, waves of all orders resemble the model's offset, so only their orthogonal
 // part counts.
@@ -136,7 +152,7 @@ std::vector<double> likely_orders(const RegressionProblem& data, const catalogue
   const std::size_t given = static_cast<std::size_t>(std::find_if(entry.parameters.begin(), entry.parameters.end(),
                                                                   [](const auto& p) { return p.kind == Kind::given; }) -
                                                      entry.parameters.begin());
-  for (const double order : possible_orders(entry, data.prepared().drive)) {
+  for (const double order : possible_orders(entry, data.prepared())) {
     Eigen::MatrixXd waves(left.residual.size(), 0);
     for (std::size_t p = 0; p < entry.parameters.size(); ++p) {
       if (p == given) continue;
@@ -269,10 +285,12 @@ bool has_phase_error(const Terms& terms, const catalogue::Entry& entry, std::opt
          });
 }
 
-std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive) {
+std::vector<double> possible_orders(const catalogue::Entry& entry, const estimation::PreparedData& prepared) {
   std::vector<double> orders;
+  for (const double order : catalogue::orders_of_output(entry, prepared.drive))
+    if (largest_range_in_turns(prepared) * order >= kPolicy.fewest_cycles) orders.push_back(order);
   for (int order = 1; order <= kPolicy.highest_order; ++order) orders.push_back(order);
-  for (const double order : catalogue::orders_of_motor(entry, drive))
+  for (const double order : catalogue::orders_of_motor(entry, prepared.drive))
     if (order > kPolicy.highest_order) orders.push_back(order);
   return orders;
 }

@@ -30,9 +30,9 @@ struct Unexplained {
 std::vector<CandidateModel> candidate_models(const estimation::RegressionProblem& data, const estimation::Terms& terms,
                                              const Unexplained& left);
 
-// The orders that a drive may have: all up to the policy's highest, and those that pole pairs and slots of its motor
-// give beyond.
-std::vector<double> possible_orders(const catalogue::Entry& entry, const model::Drive& drive);
+// The orders that the drive may have: all up to the policy's highest, those that pole pairs and slots of its motor give
+// beyond, and those of the output's turn of which a record's range of angles holds whole cycles.
+std::vector<double> possible_orders(const catalogue::Entry& entry, const estimation::PreparedData& prepared);
 
 // Parameters that are fitted.
 std::size_t free_count(const estimation::Terms& terms);

@@ -29,13 +29,12 @@ struct Extension {
   std::optional<double> order;
   Terms terms;
   double highest_hz = 0.0;    // of its order
+  bool is_placebo = false;    // no drive has such an order: it competes with the others and is never named
   std::size_t nonlinear = 0;  // parameters that are searched over
   std::size_t searched = 0;   // place of that parameter, where there is one, and its range
   estimation::ParameterRange range = {};
 
   const estimation::Term& added() const { return terms.back(); }
-  // No drive has such an order. It competes with the others and is never named.
-  bool is_placebo() const { return order && *order != std::round(*order); }
   bool modulates() const { return entry.info->phase == Phase::modulate; }
   bool is_of_effort() const { return (entry.info->reads & effects::kCurrent) != 0 && !entry.has_state; }
   bool reads_direction() const {
@@ -67,15 +66,25 @@ CandidateTerm term_of(const catalogue::Entry& entry, std::optional<double> order
   return term;
 }
 
-// Orders of which the data hold whole cycles; nothing where the effect has none.
-std::vector<std::optional<double>> orders_of(const catalogue::Entry& entry, const model::Drive& drive,
-                                             const Motion& motion, const SelectionPolicy& policy) {
-  if (entry.count(Kind::given) == 0) return {std::nullopt};
-  std::vector<std::optional<double>> orders;
-  for (const double order : possible_orders(entry, drive))
-    if (motion.travel * order / motion.turn >= policy.fewest_cycles) orders.emplace_back(order);
-  for (const double order : policy.placebo_orders_resampled)
-    if (motion.travel * order / motion.turn >= policy.fewest_cycles) orders.emplace_back(order);
+struct TriedOrder {
+  std::optional<double> order;
+  bool is_placebo = false;
+};
+
+// Orders of which the data hold whole cycles, and placebos; one without a value where the effect has none. Those of the
+// output's turn have placebos of their own.
+std::vector<TriedOrder> orders_of(const catalogue::Entry& entry, const estimation::PreparedData& prepared,
+                                  const Motion& motion, const SelectionPolicy& policy) {
+  if (entry.count(Kind::given) == 0) return {{}};
+  std::vector<TriedOrder> orders;
+  const auto add_visible = [&](double order, bool is_placebo) {
+    if (motion.travel * order / motion.turn >= policy.fewest_cycles) orders.push_back({order, is_placebo});
+  };
+  const std::vector<double> possible = possible_orders(entry, prepared);
+  for (const double order : possible) add_visible(order, false);
+  for (const double order : policy.placebo_orders_resampled) add_visible(order, true);
+  if (!possible.empty() && possible.front() < 1.0)
+    for (const double factor : policy.placebos_of_output_turn) add_visible(factor * possible.front(), true);
   return orders;
 }
 
@@ -183,7 +192,7 @@ void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedC
   term.nonlinear = e.nonlinear;
   term.values = e.added().values;
   term.highest_hz = e.highest_hz;
-  term.is_placebo = e.is_placebo();
+  term.is_placebo = e.is_placebo;
   if (term.is_placebo) {
     term.entry = nullptr;
     term.name += " (an order that no drive has)";
@@ -224,7 +233,6 @@ void append_values(Extension e, const RegressionProblem& data, const SelectionPo
 
 std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& motion) {
   const RegressionProblem& data = builder.sign.data;
-  const model::Drive& drive = builder.sign.prepared.drive;
   const bool collapsed = !builder.sign.prepared.output_signals.torque && data.balance() == Balance::motor;
   std::vector<Extension> all;
   for (const catalogue::Entry& entry : catalogue::all()) {
@@ -232,9 +240,9 @@ std::vector<Extension> extensions_of(const TableBuilder& builder, const Motion& 
     if (entry.identified_on() != data.balance() && !(collapsed && info.balance == Balance::load)) continue;
     if (info.phase == Phase::shift || entry.has_state || entry.definition) continue;  // states: see presliding
     if (!may_be_seen(data, builder.terms, entry)) continue;
-    for (const std::optional<double>& order : orders_of(entry, drive, motion, builder.policy)) {
+    for (const auto& [order, is_placebo] : orders_of(entry, builder.sign.prepared, motion, builder.policy)) {
       if (has_phase_error(builder.terms, entry, order)) continue;
-      Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0};
+      Extension e{entry, order, {}, order ? *order * motion.typical_speed / motion.turn : 0.0, is_placebo};
       try {
         e.terms = extend(builder.terms, entry, order);
       } catch (const model::ModelError&) {
@@ -359,7 +367,7 @@ std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensio
                                           const Motion& motion, const LeftByModel& left) {
   std::map<std::pair<const catalogue::Entry*, bool>, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < extensions.size(); ++i)
-    if (extensions[i].order) places[{&extensions[i].entry, extensions[i].is_placebo()}].push_back(i);
+    if (extensions[i].order) places[{&extensions[i].entry, extensions[i].is_placebo}].push_back(i);
   std::vector<std::vector<std::size_t>> lists;
   for (auto& [effect, list] : places) lists.push_back(std::move(list));
   std::vector<double> taken(extensions.size(), 0.0);
@@ -378,7 +386,7 @@ std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensio
   for (std::size_t i = 0; i < extensions.size(); ++i)
     if (is_kept[i] != 0)
       kept.push_back(extensions[i]);
-    else if (!extensions[i].is_placebo())
+    else if (!extensions[i].is_placebo)
       builder.table.smaller_waves.emplace_back(&extensions[i].entry, *extensions[i].order);
   return kept;
 }

@@ -90,6 +90,14 @@ double explained(const std::vector<ActingBalance>& acting, const Terms& terms, d
   return residual.squaredNorm() - left.squaredNorm();
 }
 
+// Orders that no drive has, as those of the motor's turn or, for an order below one, of the output's.
+std::vector<double> placebos_of(double order) {
+  std::vector<double> placebos;
+  for (int i = 0; i < kPolicy.placebo_orders; ++i)
+    placebos.push_back((kPolicy.first_placebo_order + i) * std::min(1.0, order));
+  return placebos;
+}
+
 // Whether the order is likelier than any that no drive has, by the noise that is left with it.
 bool is_likelier_than_placebos(std::vector<ActingBalance> acting, const CandidateFit& candidate) {
   const BalanceSearch& own_search = *acting.front().search;
@@ -98,10 +106,8 @@ bool is_likelier_than_placebos(std::vector<ActingBalance> acting, const Candidat
                                                candidate.fit.root_weights);
   acting.front() = {&own_search, &projection, &candidate.fit};
   const double true_gain = explained(acting, candidate.fit.terms, *candidate.model.order);
-  for (int i = 0; i < kPolicy.placebo_orders; ++i)
-    if (explained(acting, candidate.fit.terms, kPolicy.first_placebo_order + i) >
-        true_gain - kPolicy.score_over_placebo)
-      return false;
+  for (const double placebo : placebos_of(*candidate.model.order))
+    if (explained(acting, candidate.fit.terms, placebo) > true_gain - kPolicy.score_over_placebo) return false;
   return true;
 }
 
@@ -119,8 +125,7 @@ std::string objection_to_order(const std::vector<ActingBalance>& acting, const C
   const double order = *candidate.model.order;
   const double true_gain = explained(acting, candidate.fit.terms, order);
   double best_gain = 0.0, best_placebo = 0.0;
-  for (int i = 0; i < kPolicy.placebo_orders; ++i) {
-    const double placebo = kPolicy.first_placebo_order + i;
+  for (const double placebo : placebos_of(order)) {
     const double gain = explained(acting, candidate.fit.terms, placebo);
     if (gain <= best_gain) continue;
     best_gain = gain;

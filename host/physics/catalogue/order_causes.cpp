@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <string>
 
 namespace flexspline::catalogue {
 namespace {
@@ -21,12 +22,13 @@ enum ShowsAs : unsigned {
   kEverything = 15,  // of the gear
 };
 
-enum Facts : unsigned { kNoFact = 0, kPolePairs = 1, kSlots = 2, kGear = 4 };
+enum Facts : unsigned { kNoFact = 0, kPolePairs = 1, kSlots = 2, kGear = 4, kOutputTurn = 8 };
 
 struct MotorTurn {
   std::optional<long> pole_pairs;
   std::optional<long> slots;
-  std::optional<double> gear_ratio;  // of a strain-wave gear
+  std::optional<double> gear_ratio;    // of a strain-wave gear
+  std::optional<double> output_ratio;  // of any rotary gear: turns of the motor in a turn of the output
   bool is_known = false;
 };
 
@@ -43,7 +45,7 @@ struct Row {
 
 // Strain-wave gears of one stage with two lobes are made from 30:1 up. Less is another gear.
 constexpr double kLeastStrainWaveRatio = 30.0;
-// Stated orders are written with few digits.
+// Stated orders are written with few digits. Below one the tolerance is relative.
 constexpr double kTolerance = 1e-3;
 
 constexpr std::string_view kMeasurementErrors =
@@ -134,10 +136,15 @@ constexpr Row kRows[] = {
      "Turn the shaft by hand or by another motor with the bridge off: the ripple stays.",
      "Map the torque over the motor's angle and compensate for it; a motor with skewed slots or magnets has less.",
      "Hendershot and Miller, Design of Brushless Permanent-Magnet Machines"},
-    {kFriction, kGear, [](const MotorTurn& m) { return 1.0 / *m.gear_ratio; }, "1 per output turn",
+    {kFriction, kOutputTurn, [](const MotorTurn& m) { return 1.0 / *m.output_ratio; }, "1 per output turn",
      "the output: its bearing or seal is out of round or out of line, or a cable drags in a part of the turn",
      "Turn the output by hand, uncoupled from the motor, and look for the tight place; release the cables and repeat.",
      "Align or replace bearing and seal; lay the cables so that they do not drag.",
+     "Armstrong-Helouvry, Control of Machines with Friction, 1991"},
+    {kFriction, kOutputTurn, [](const MotorTurn& m) { return 2.0 / *m.output_ratio; }, "2 per output turn",
+     "the output: its bearing or seal is pressed oval by its seat, or by screws that are not tightened evenly",
+     "Release the screws of the output bearing, tighten them evenly and repeat: the two tight places change.",
+     "Correct the roundness of the seat; tighten the screws crosswise to the stated torque.",
      "Armstrong-Helouvry, Control of Machines with Friction, 1991"},
     {kEverything, kGear, [](const MotorTurn& m) { return 2.0 * *m.gear_ratio + 2.0; }, "2 x gear_ratio + 2",
      "the mesh of the teeth, where the circular spline is fixed: the number of its teeth",
@@ -171,6 +178,7 @@ MotorTurn motor_turn_of(const model::Drive& drive) {
   const double ratio = drive.gear_ratio.value.value_or(1.0);
   const bool rotary = drive.axis == data::Axis::rotary;
   if (rotary && ratio >= kLeastStrainWaveRatio) turn.gear_ratio = ratio;
+  if (rotary && ratio > 1.0) turn.output_ratio = ratio;
   // Positions with a ratio of one may be those of the joint; a motor whose poles or slots are stated has no gear then.
   const bool is_direct = drive.gear_ratio.value && (turn.pole_pairs || turn.slots);
   turn.is_known = rotary ? ratio != 1.0 || is_direct : drive.pitch_m.value.has_value();
@@ -179,7 +187,19 @@ MotorTurn motor_turn_of(const model::Drive& drive) {
 
 bool has_facts(const Row& row, const MotorTurn& turn) {
   return ((row.needs & kPolePairs) == 0 || turn.pole_pairs) && ((row.needs & kSlots) == 0 || turn.slots) &&
-         ((row.needs & kGear) == 0 || turn.gear_ratio);
+         ((row.needs & kGear) == 0 || turn.gear_ratio) && ((row.needs & kOutputTurn) == 0 || turn.output_ratio);
+}
+
+// Of all rows that need one of these facts: rising, each once.
+std::vector<double> orders_from(unsigned facts, const Entry& effect, const MotorTurn& turn) {
+  std::vector<double> orders;
+  if (!turn.is_known) return orders;
+  for (const Row& row : kRows)
+    if ((row.needs & facts) != 0 && (row.shows_as & shows_as(effect)) != 0 && has_facts(row, turn))
+      orders.push_back(row.order(turn));
+  std::sort(orders.begin(), orders.end());
+  orders.erase(std::unique(orders.begin(), orders.end()), orders.end());
+  return orders;
 }
 
 }  // namespace
@@ -190,7 +210,7 @@ std::vector<OrderCause> order_causes(const Entry& effect, double order, const mo
   if (!turn.is_known) return causes;
   for (const Row& row : kRows) {
     if ((row.shows_as & shows_as(effect)) == 0 || !has_facts(row, turn)) continue;
-    if (std::abs(row.order(turn) - order) > kTolerance) continue;
+    if (std::abs(row.order(turn) - order) > kTolerance * std::min(1.0, order)) continue;
     const bool of_facts = row.from.find(" x ") != std::string_view::npos;
     causes.push_back({of_facts ? fmt::format("{} = {:g}", row.from, order) : std::string(row.from), row.cause,
                       row.check, row.cure, row.reference});
@@ -223,14 +243,12 @@ std::string order_hint(const Entry& effect, const model::Drive& drive) {
 }
 
 std::vector<double> orders_of_motor(const Entry& effect, const model::Drive& drive) {
-  const MotorTurn turn = motor_turn_of(drive);
-  std::vector<double> orders;
-  if (!turn.is_known) return orders;
-  for (const Row& row : kRows)
-    if ((row.needs & (kPolePairs | kSlots)) != 0 && (row.shows_as & shows_as(effect)) != 0 && has_facts(row, turn))
-      orders.push_back(row.order(turn));
-  std::sort(orders.begin(), orders.end());
-  orders.erase(std::unique(orders.begin(), orders.end()), orders.end());
+  return orders_from(kPolePairs | kSlots, effect, motor_turn_of(drive));
+}
+
+std::vector<double> orders_of_output(const Entry& effect, const model::Drive& drive) {
+  std::vector<double> orders = orders_from(kOutputTurn, effect, motor_turn_of(drive));
+  for (double& order : orders) order = std::stod(fmt::format("{:g}", order));
   return orders;
 }
 

@@ -30,4 +30,7 @@ std::string order_hint(const Entry& effect, const model::Drive& drive);
 // The orders that pole pairs and slots of the motor give, rising, each once.
 std::vector<double> orders_of_motor(const Entry& effect, const model::Drive& drive);
 
+// Orders below one, which repeat with the turn of the output behind a gear: rising, as they are written (six digits).
+std::vector<double> orders_of_output(const Entry& effect, const model::Drive& drive);
+
 }  // namespace flexspline::catalogue
