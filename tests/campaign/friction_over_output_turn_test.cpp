@@ -1,5 +1,5 @@
-// Friction that varies over the turn of the output behind a gear: torques that are written down, along strokes of two
-// output turns and more.
+// Friction that varies over the turn of the output behind a gear: torques that are written down, along strokes of an
+// output turn and more.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -48,13 +48,14 @@ std::string named(double turns, std::uint64_t seed, const std::function<double(d
 }
 
 TEST(FrictionOverOutputTurn, IsNamedWithItsOrder) {
+  EXPECT_EQ(named(1.5, 8, [](double q, double) { return 0.003 * std::cos(q - 0.5); }), "angle_dependent_friction:0.02");
   EXPECT_EQ(named(2.2, 1, [](double q, double) { return 0.003 * std::cos(q - 0.5); }), "angle_dependent_friction:0.02");
   EXPECT_EQ(named(2.2, 2, [](double q, double) { return 0.003 * std::cos(2.0 * q + 1.0); }),
             "angle_dependent_friction:0.04");
 }
 
-TEST(FrictionOverOutputTurn, IsNotNamedInAStrokeThatDoesNotHoldTwoTurns) {
-  EXPECT_EQ(named(1.5, 3, [](double q, double) { return 0.003 * std::cos(q - 0.5); }), "");
+TEST(FrictionOverOutputTurn, IsNotNamedInAStrokeThatHoldsHardlyMoreThanATurn) {
+  EXPECT_EQ(named(1.2, 3, [](double q, double) { return 0.003 * std::cos(q - 0.5); }), "");
 }
 
 TEST(FrictionOverOutputTurn, IsNotNamedForFrictionThatDependsOnSomethingElse) {

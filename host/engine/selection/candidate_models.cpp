@@ -288,7 +288,7 @@ bool has_phase_error(const Terms& terms, const catalogue::Entry& entry, std::opt
 std::vector<double> possible_orders(const catalogue::Entry& entry, const estimation::PreparedData& prepared) {
   std::vector<double> orders;
   for (const double order : catalogue::orders_of_output(entry, prepared.drive))
-    if (largest_range_in_turns(prepared) * order >= kPolicy.fewest_cycles) orders.push_back(order);
+    if (largest_range_in_turns(prepared) * order >= kPolicy.least_range_of_cycle) orders.push_back(order);
   for (int order = 1; order <= kPolicy.highest_order; ++order) orders.push_back(order);
   for (const double order : catalogue::orders_of_motor(entry, prepared.drive))
     if (order > kPolicy.highest_order) orders.push_back(order);

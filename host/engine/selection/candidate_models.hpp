@@ -31,7 +31,7 @@ std::vector<CandidateModel> candidate_models(const estimation::RegressionProblem
                                              const Unexplained& left);
 
 // The orders that the drive may have: all up to the policy's highest, those that pole pairs and slots of its motor give
-// beyond, and those of the output's turn of which a record's range of angles holds whole cycles.
+// beyond, and those of the output's turn of which a record's range of angles holds more than a cycle.
 std::vector<double> possible_orders(const catalogue::Entry& entry, const estimation::PreparedData& prepared);
 
 // Parameters that are fitted.

@@ -195,7 +195,9 @@ struct SelectionPolicy {
   int placebo_orders = 24;
   std::array<double, 12> placebo_orders_resampled{1.27, 2.73, 3.29,  4.71,  5.29,  6.73,
                                                   8.27, 9.71, 11.29, 13.73, 16.27, 19.71};
-  // Likewise for the orders of the output's turn, in units of the lowest of them.
+  // Placebos for the orders of the output's turn, in units of the lowest of them; and the range of angles that a record
+  // must have for such an order, in its cycles.
+  double least_range_of_cycle = 1.25;
   std::array<double, 4> placebos_of_output_turn{0.63, 1.37, 2.71, 3.29};
   double least_over_placebo = 1.5;  // squares over those of the best placebo (by hand, records of one to five turns)
   // Where nothing but noise is left, likelihood distinguishes orders although a wrong one may explain most of it: score
