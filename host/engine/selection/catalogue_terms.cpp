@@ -361,6 +361,18 @@ std::vector<double> taken_by_waves(std::span<const Extension> waves, const Table
   return taken;
 }
 
+// Where a wave is kept, so are those whose error of the phase it may be: they compete with it.
+void keep_waves_of_phase_errors(const std::vector<Extension>& extensions, std::vector<std::uint8_t>& is_kept) {
+  const std::vector<std::uint8_t> largest = is_kept;
+  for (std::size_t i = 0; i < extensions.size(); ++i) {
+    if (largest[i] == 0 || !extensions[i].order || extensions[i].is_placebo) continue;
+    for (std::size_t k = 0; k < extensions.size(); ++k)
+      if (extensions[k].order == extensions[i].order &&
+          catalogue::names_contain(extensions[i].entry.info->phase_error_of, extensions[k].entry.name()))
+        is_kept[k] = 1;
+  }
+}
+
 // Leaves out, of waves over the angle, all but those that take most off what the model leaves of all data, of each
 // effect and of placebos likewise: the others would cost most of the time. Those of effects are listed in the table.
 std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensions, const TableBuilder& builder,
@@ -382,6 +394,7 @@ std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensio
     std::ranges::stable_sort(list, std::greater{}, [&](std::size_t i) { return taken[i]; });
     for (std::size_t k = builder.policy.orders_resampled; k < list.size(); ++k) is_kept[list[k]] = 0;
   }
+  keep_waves_of_phase_errors(extensions, is_kept);
   std::vector<Extension> kept;
   for (std::size_t i = 0; i < extensions.size(); ++i)
     if (is_kept[i] != 0)
@@ -391,13 +404,41 @@ std::vector<Extension> with_largest_waves(const std::vector<Extension>& extensio
   return kept;
 }
 
+bool is_phase_error_of(const CandidateTerm& left, const CandidateTerm& wave) {
+  return left.entry && wave.entry && left.order && left.order == wave.order &&
+         catalogue::names_contain(left.entry->info->phase_error_of, wave.entry->name());
+}
+
+// A wave over the angle with a delay between effort and motion: to first order, with its slope in time. A delay gives
+// it a part that turns with the direction, which a friction over the angle would take for its own.
+void add_delayed_waves(TableBuilder& builder, std::size_t first) {
+  std::vector<CandidateTerm>& terms = builder.table.terms;
+  const std::size_t count = terms.size();
+  for (std::size_t w = first; w < count; ++w) {
+    if (!terms[w].entry || (terms[w].entry->info->reads & effects::kTorque) != 0) continue;
+    const auto mistaken = [&](const CandidateTerm& left) { return is_phase_error_of(left, terms[w]); };
+    if (std::none_of(terms.begin() + static_cast<std::ptrdiff_t>(first), terms.end(), mistaken)) continue;
+    CandidateTerm delayed = terms[w];
+    delayed.is_delayed = true;
+    Eigen::MatrixXd slopes(builder.table.target.size(), std::ssize(terms[w].columns));
+    for (Eigen::Index j = 0; j < slopes.cols(); ++j)
+      slopes.col(j) = slope_of(builder.columns[static_cast<std::size_t>(terms[w].columns[static_cast<std::size_t>(j)])],
+                               builder.table.runs);
+    for (const Eigen::Index column : builder.add({std::move(slopes), {}})) {
+      delayed.columns.push_back(column);
+      delayed.low.push_back(-effects::kUnbounded);
+      delayed.high.push_back(effects::kUnbounded);
+    }
+    terms.push_back(std::move(delayed));
+  }
+}
+
 // Terms from `first` on that are what an error of another one's phase leaves.
 void exclude_phase_errors(RegressorTable& table, std::size_t first) {
   for (std::size_t a = first; a < table.terms.size(); ++a)
     for (std::size_t b = first; b < table.terms.size(); ++b) {
       CandidateTerm &left = table.terms[a], &wave = table.terms[b];
-      if (!left.entry || !wave.entry || !left.order || left.order != wave.order) continue;
-      if (!catalogue::names_contain(left.entry->info->phase_error_of, wave.entry->name())) continue;
+      if (!is_phase_error_of(left, wave)) continue;
       left.excludes.push_back(wave.name);
       wave.excludes.push_back(left.name);
     }
@@ -421,6 +462,7 @@ void add_catalogue_terms(TableBuilder& builder, const Motion& motion) {
     add_term(builder, extensions[i],
              {std::move(sign[i]),
               builder.presliding && extensions[i].reads_direction() ? std::move(*next++) : Eigen::MatrixXd()});
+  add_delayed_waves(builder, first);
   exclude_phase_errors(builder.table, first);
 }
 

@@ -124,6 +124,7 @@ class ForwardStep {
     int term = 0;
     TermFit fitted;
     double gain = -1e300;
+    double criterion = 1e300;  // of training squares and of how many parameters they took
   };
 
   ForwardStep(const RegressorTable& table, const HalfData& fit, const HalfData& validation, const Noise& noise,
@@ -200,13 +201,14 @@ class ForwardStep {
     with.push_back(t);
     TermFit fitted = fit_terms(table_, with, fit_, validation_);
     const auto found = by_name.find(name);
-    if (found != by_name.end() && found->second.fitted.training_squares <= fitted.training_squares) return;
-    if (!is_possible(table_, with, fitted, fit_) && was_possible_) return;
     const double by_chance = now_.validation_squares / validation_.rows * noise_.tau;
+    const double criterion = fitted.training_squares + parameters * by_chance;
+    if (found != by_name.end() && found->second.criterion <= criterion) return;
+    if (!is_possible(table_, with, fitted, fit_) && was_possible_) return;
     double gain = now_.validation_squares - fitted.validation_squares - parameters * by_chance;
     // A curve that is in no catalogue can follow most laws: it has to do better.
     if (is_generic_curve(table_, t) && gain > 0.0) gain *= policy_.curve_discount;
-    by_name[name] = {t, std::move(fitted), gain};
+    by_name[name] = {t, std::move(fitted), gain, criterion};
   }
 
   const RegressorTable& table_;

@@ -30,6 +30,7 @@ struct CandidateTerm {
   bool sum_is_positive = false;  // of the coefficients: amplitudes of a law that may differ by direction
   double most_at_peak = 0.0;     // largest coefficient that is plausible; 0: any
   bool is_placebo = false;
+  bool is_delayed = false;    // a wave with the slopes of its columns, too: with a delay between effort and motion
   std::size_t nonlinear = 0;  // parameters that were searched over
   double highest_hz = 0.0;    // the bandwidth must reach that far for it to be seen
   // Terms of which this is what an error of the phase leaves, or the reverse: not both are chosen.

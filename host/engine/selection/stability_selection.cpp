@@ -304,7 +304,7 @@ std::vector<int> StabilitySelection::terms_of(const SettingResult& setting,
     int best = -1;
     double least = 0.0;
     for (std::size_t t = 0; t < setting.columns.terms.size(); ++t) {
-      if (setting.columns.terms[t].name != name) continue;
+      if (setting.columns.terms[t].name != name || setting.columns.terms[t].is_delayed) continue;
       chosen.push_back(static_cast<int>(t));
       const double squares = fit_terms(setting.columns, chosen, setting.all, setting.all).training_squares;
       chosen.pop_back();
