@@ -191,17 +191,81 @@ std::unique_ptr<AllRecords> fit_all_records(const SearchedBalance& motor, const 
   return all;
 }
 
+namespace {
+
+std::size_t records_in_motion(const RegressionProblem& data) {
+  return static_cast<std::size_t>(
+      std::count_if(data.records().begin(), data.records().end(),
+                    [&](const estimation::RowRange& range) { return !data.prepared().records[range.record].at_rest; }));
+}
+
+// The candidate whose likelihood with random effects says that friction goes with it, although too few records identify
+// a friction of their own; null: none does.
+const CandidateFit* likely_scaling(const SearchedBalance& motor) {
+  const auto is_likely = [](const CandidateFit& t) {
+    if (!is_scaling(*t.model.entry) || !passes(t)) return false;
+    return t.fit.terms.back().values.front() * t.model.entry->parameters.front().usual > 0.0;
+  };
+  const CandidateFit* best = nullptr;
+  for (const CandidateFit& t : motor.candidates)
+    if (is_likely(t) && (best == nullptr || t.gain.score > best->gain.score)) best = &t;
+  return best;
+}
+
+// Puts the effect behind those that are named. Its candidate has its values.
+void name_it(const NamedEffect& name, const BetweenRecords& evidence, Diagnosis& result) {
+  const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
+    return c.effect == name.effect && c.balance == estimation::Balance::motor;
+  });
+  std::erase_if(result.possible, [&](const PossibleEffect& p) { return p.group.front().effect == name.effect; });
+  std::rotate(result.candidates.begin() + std::ssize(result.named), at, at + 1);
+  result.named.push_back(name);
+  result.verdict = Verdict::missing_effect;
+  result.balance = estimation::Balance::motor;
+  result.partial = true;
+  result.between_records = evidence;
+}
+
+bool name_likely_scaling(const SearchedBalance& motor, Diagnosis& result) {
+  const std::size_t records = records_in_motion(*motor.search.data);
+  const CandidateFit* const likely = likely_scaling(motor);
+  if (likely == nullptr || records < kPolicy.fewest_of_scaling || !result.named.empty()) return false;
+  const auto tried = static_cast<double>(
+      std::ranges::count_if(motor.candidates, [](const CandidateFit& t) { return is_scaling(*t.model.entry); }));
+  const double p_value = std::min(1.0, tried * p_value_of_likelihood(likely->gain.score, records));
+  const NamedEffect name{std::string(likely->model.entry->name()), std::nullopt};
+  const auto at = std::ranges::find_if(result.candidates, [&](const Candidate& c) { return c.effect == name.effect; });
+  if (p_value > kPolicy.scaling_p_value || at == result.candidates.end()) return false;
+  at->admit();
+  at->p_value = p_value;
+  at->note = fmt::format(
+      "Found between records, by the likelihood of all {} (p = {:.2g}). What else changed from record to record, such "
+      "as wear-in over time, would look the same: repeat one motion cold and warm to make sure.",
+      records, p_value);
+  name_it(name, {records, likely->gain.fixed_effects_percent, p_value}, result);
+  return true;
+}
+
+}  // namespace
+
+double p_value_of_likelihood(double likelihood_ratio, std::size_t records) {
+  if (records < 3 || !(likelihood_ratio > 0.0)) return 1.0;
+  const auto n = static_cast<double>(records);
+  const double t = std::sqrt((n - 2.0) * std::expm1(likelihood_ratio / n));
+  return numbers::student_t_above(n - 2.0, t);
+}
+
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result) {
   const RegressionProblem& data = motor_balance_of(base);
   const RecordFriction own = friction_by_record(base, data, kPolicy.fewest_of_scaling);
   if (own.parameters.empty()) {
     list_of_few_records(base, data, motor.candidates, result);
-    return false;
+    return name_likely_scaling(motor, result);
   }
   const std::vector<Scaling> all = scalings(base, data, motor.candidates, own);
   const auto best = std::min_element(all.begin(), all.end(),
                                      [](const Scaling& a, const Scaling& b) { return a.p_value < b.p_value; });
-  if (best == all.end() || p_value_of_all(*best, all) > kPolicy.wald_p_value) return false;
+  if (best == all.end() || p_value_of_all(*best, all) > kPolicy.wald_p_value) return name_likely_scaling(motor, result);
   const double p_value = p_value_of_all(*best, all);
   const NamedEffect name{std::string(best->candidate->model.entry->name()), std::nullopt};
   if (std::any_of(result.named.begin(), result.named.end(),
@@ -213,17 +277,12 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   if (at == result.candidates.end()) return false;
   const std::size_t records = own.records.size();
   if (p_value > kPolicy.scaling_p_value) {
+    if (name_likely_scaling(motor, result)) return true;
     list_as_possible(name, chance_between_records(records, p_value), result);
     return false;
   }
   take_value(*best, records, p_value, *at);
-  std::erase_if(result.possible, [&](const PossibleEffect& p) { return p.group.front().effect == name.effect; });
-  std::rotate(result.candidates.begin() + std::ssize(result.named), at, at + 1);
-  result.named.push_back(name);
-  result.verdict = Verdict::missing_effect;
-  result.balance = estimation::Balance::motor;
-  result.partial = true;
-  result.between_records = {records, 100.0 * best->fit.explained_share, p_value};
+  name_it(name, {records, 100.0 * best->fit.explained_share, p_value}, result);
   return true;
 }
 

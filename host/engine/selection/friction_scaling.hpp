@@ -20,8 +20,14 @@ struct AllRecords {
 std::unique_ptr<AllRecords> fit_all_records(const SearchedBalance& motor, const data::Dataset& dataset,
                                             const model::Model& model, estimation::PipelineOptions pipeline);
 
+// By chance, where all of a likelihood ratio (twice the logarithm) is how the friction of so many records goes with one
+// signal: Student's t of a line through them, as n ln(1 + t^2 / (n - 2)) is its likelihood ratio. One for fewer than
+// three.
+double p_value_of_likelihood(double likelihood_ratio, std::size_t records);
+
 // Names the effect with which the records' friction goes, behind what is named already (meta-regression to first order,
-// Student's t by Knapp and Hartung 2003, times the effects that were tried), or lists it as possible. Returns whether
+// Student's t by Knapp and Hartung 2003, times the effects that were tried), or lists it as possible. Where too few
+// records identify a friction of their own, the likelihood of all data decides, if nothing is named. Returns whether
 // one is named. `base`: the model fitted on the records that count.
 bool name_scaling(const estimation::Identification& base, const SearchedBalance& motor, Diagnosis& result);
 

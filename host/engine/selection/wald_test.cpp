@@ -1,6 +1,9 @@
 #include "host/engine/selection/wald_test.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "host/common/numbers/distributions.hpp"
@@ -42,6 +45,20 @@ Candidate* candidate_of_name(Diagnosis& result, const NamedEffect& name) {
   return at == result.candidates.end() ? nullptr : &*at;
 }
 
+// A nonlinear parameter whose interval is its whole possible range: at the ends of the range the law is one that the
+// model has, or vanishes, so that the data do not show it.
+std::optional<std::string> undetermined_shape(const Candidate& candidate) {
+  const catalogue::Entry* const entry = catalogue::find(candidate.effect);
+  if (!entry) return std::nullopt;
+  for (const estimation::Estimate& e : candidate.parameters) {
+    const effects::ParameterInfo& info = entry->parameters[e.ref.parameter];
+    if (info.kind == effects::Kind::nonlinear && !e.fixed && e.low && e.high && *e.low <= info.low &&
+        *e.high >= info.high)
+      return std::string(info.name);
+  }
+  return std::nullopt;
+}
+
 // Why a name is taken back; empty where it stays. An axis that sticks is confirmed by held-out experiments, too, as it
 // sticks there as well.
 std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
@@ -50,6 +67,8 @@ std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
   if (has_unresolved_travel(*candidate))
     return "the interval of its travel holds zero: an axis that only sticks looks like it";
   if (is_confirmed_by_held_out(result, name)) return {};
+  if (const std::optional<std::string> shape = undetermined_shape(*candidate))
+    return fmt::format("the interval of its {} is all that is possible", *shape);
   const std::optional<double> p = wald_p_value(*candidate);
   return p && *p > kPolicy.wald_p_value ? "its values do not differ from zero beyond their intervals" : "";
 }
