@@ -1,5 +1,6 @@
 # Writes a file of ctest's with one test for six suites of `program`, named after all of them, so that `ctest -R` finds each: to
-# start the program under the sanitizers takes 0.3 s of processor time, as long as all tests of many a suite.
+# start the program under the sanitizers takes 0.3 s of processor time, as long as all tests of many a suite; tests in one process share what
+# they begin with.
 # cmake -Dprogram=... -Dout=... -Dtimeout=SECONDS -P list_suites.cmake
 execute_process(COMMAND ${program} --gtest_list_tests OUTPUT_VARIABLE listed RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
