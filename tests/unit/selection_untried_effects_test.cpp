@@ -23,7 +23,7 @@ Diagnosis diagnosis_of_torque() {
   std::normal_distribution<double> noise(0.0, 1e-3);
   for (const double hz : {0.3, 0.5, 0.8, 1.0})
     dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(hz), 4e-3, 3000, [&](double t, data::Experiment& e) {
+        tests::written_experiment(std::to_string(hz), 4e-3, 1500, [&](double t, data::Experiment& e) {
           const double rate = kTurn * hz, q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t);
           const double torque = -8e-4 * rate * rate * q + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0);
           const double linear_a = torque / kNmPerA, current = linear_a + 3e-4 * std::pow(linear_a, 3) + noise(random);
