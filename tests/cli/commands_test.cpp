@@ -184,12 +184,12 @@ TEST(Simulate, ItsFilesAreMeasurementsAgain) {
 TEST(Simulate, NeverWritesOverMeasurements) {
   const Shell shell;
   shell.record_and_identify();
-  shell.must("flexspline simulate --model fitted.toml demo-out --out sim");
-  const std::string line = "flexspline simulate --model fitted.toml ";
-  const Answer full = shell.run(line + "demo-out --out sim");
+  const std::string line = "flexspline simulate --model fitted.toml ", run = "demo-out/free-sine-1hz.csv";
+  shell.must(line + run + " --out sim");
+  const Answer full = shell.run(line + run + " --out sim");
   EXPECT_EQ(full.code, 2);
   EXPECT_TRUE(contains(full.err, "--force")) << full.err;
-  shell.must(line + "demo-out --out sim --force");
+  shell.must(line + run + " --out sim --force");
   const std::string csv = shell.file("sim/free-sine-1hz.csv"), toml = shell.file("sim/dataset.toml");
   for (const char* data : {"sim", "sim/dataset.toml", "sim/free-sine-1hz.csv"}) {
     const Answer own = shell.run(line + data + " --out ./sim --force");

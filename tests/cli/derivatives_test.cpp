@@ -91,7 +91,9 @@ TEST(Derivatives, WithoutATachometerTheSmootherIsTheReferenceAndAPictureIsDrawn)
 TEST(Derivatives, KalmanAsAnOptionOfThePipelineFindsTheSameParameters) {
   const Shell shell;
   shell.must("flexspline-hil record --out drive --hide viscous_asymmetry --seed 5");
-  const std::string identify = "flexspline identify drive --model drive/base-model.toml";
+  const std::string identify =
+      "flexspline identify drive/free-sine-1hz.csv drive/free-sine-2hz-warm.csv drive/free-slow-warm.csv "
+      "drive/locked-sine-0.5hz.csv drive/rest.csv --model drive/base-model.toml";
   const nlohmann::json filtered = shell.json(identify);
   const std::string said = shell.must(identify + " --derivatives kalman --json smoothed.json");
   const nlohmann::json smoothed = nlohmann::json::parse(shell.file("smoothed.json"));
