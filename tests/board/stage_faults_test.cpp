@@ -61,15 +61,14 @@ TEST(BoardStageFaults, NoMotorADeadSensorAndACrossedOneAreNamed) {
   EXPECT_EQ(measured(inverted).fault, Fault::sensor_order);
 }
 
+// On the board whose legs are in another order than its phases; stage_test.cpp measures on the other one.
 TEST(BoardStageFaults, TwoSwappedWiresTurnTheEncoderTheOtherWayAndNothingElse) {
-  for (const bool is_odrive : {false, true}) {
-    motor::WiringParameters wires;
-    wires.motor_phase = {1, 0, 2};
-    const auto bench = bench_of(is_odrive, wires);
-    ASSERT_EQ(measured(*bench).state, CommissioningState::done);
-    EXPECT_TRUE(result_of(*bench).reversed);
-    EXPECT_EQ(result_of(*bench).pole_pairs, some_motor().pole_pairs);
-  }
+  motor::WiringParameters wires;
+  wires.motor_phase = {1, 0, 2};
+  const auto bench = bench_of(true, wires);
+  ASSERT_EQ(measured(*bench).state, CommissioningState::done);
+  EXPECT_TRUE(result_of(*bench).reversed);
+  EXPECT_EQ(result_of(*bench).pole_pairs, some_motor().pole_pairs);
 }
 
 // What happens to a motor that turns, and what the drive says.

@@ -206,7 +206,7 @@ TEST(Catalogue, IsRecoveredEffectByEffectFromThePlant) {
   std::vector<std::string> labels;
   for (const auto& effect : plant::demo_plant().drive.effects)
     if (effect.catalogue) labels.push_back(effect.label());
-  labels = tests::part_of(labels, 3);
+  labels = tests::part_of(labels, 5);
   const auto outcomes = recover_all(labels, 7001);
   print(outcomes);
   for (const Outcome& o : outcomes) {

@@ -73,17 +73,17 @@ void check_motors(const char* what, std::size_t motors, motor::Fidelity fidelity
 }
 
 TEST(Commissioning, RandomMotorsAreMeasuredAndNoFaultIsSeen) {
-  check_motors("averaged", tests::in_campaign<std::size_t>(60, 200), motor::Fidelity::averaged, 5);
+  check_motors("averaged", tests::in_campaign<std::size_t>(30, 200), motor::Fidelity::averaged, 5);
 }
 TEST(Commissioning, OnTheSwitchedPowerStageItMeasuresTheSame) {
-  check_motors("switched", tests::in_campaign<std::size_t>(2, 20), motor::Fidelity::switched, 21);
+  check_motors("switched", tests::in_campaign<std::size_t>(1, 20), motor::Fidelity::switched, 21);
   check_motors("switched", tests::in_campaign<std::size_t>(1, 40), motor::Fidelity::switched, 8021);
 }
 
 // A rotor with harmonics of the magnet's flux jumps from one place to the next while a current turns slowly. That is no
 // slipping encoder; the motor is measured, less exactly where it may stand at either side of a place.
 TEST(Commissioning, HarmonicsOfTheMagnetsFluxAreNoFault) {
-  const std::size_t motors = tests::in_campaign<std::size_t>(20, 200);
+  const std::size_t motors = tests::in_campaign<std::size_t>(10, 200);
   std::vector<Bench> benches = random_benches(motors, 337);
   for (std::size_t k = 0; k < motors; ++k) {
     benches[k].motor.harmonic_5 = k % 2 == 0 ? 0.06 : -0.06;
@@ -115,7 +115,7 @@ TEST(Commissioning, HarmonicsOfTheMagnetsFluxAreNoFault) {
 
 TEST(Commissioning, EveryFaultIsNamedAndNoneMistaken) {
   std::vector<FaultCase> cases;
-  const int each = tests::in_campaign(8, 50);
+  const int each = tests::in_campaign(4, 50);
   for (const Fault fault : kBenchFaults) {
     std::mt19937_64 random(100 + static_cast<std::uint64_t>(fault));
     for (int k = 0; k < each; ++k) cases.push_back(random_fault(fault, random));

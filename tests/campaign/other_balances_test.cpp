@@ -32,14 +32,13 @@ void expect_named(const std::string& hidden, double scale, double friction_varia
   }
 }
 
+// The smaller one shows what the larger one does; with friction that differs from run to run friction_differs_test.cpp
+// has one of a tenth.
 TEST(OtherBalances, DistinguishAnErrorOfTheGearFromAWrongZero) {
-  expect_named("kinematic_error", 1.0, 0.0);
-}
-TEST(OtherBalances, IdentifyAnErrorOfTheGearWhereFrictionDiffersFromRunToRun) {
-  expect_named("kinematic_error", 1.0, 0.03);
-}
-TEST(OtherBalances, IdentifyASmallErrorOfTheGear) {
   expect_named("kinematic_error", 0.5, 0.0);
+  if (!tests::whole_campaigns()) return;
+  expect_named("kinematic_error", 1.0, 0.0);
+  expect_named("kinematic_error", 1.0, 0.03);
 }
 TEST(OtherBalances, DistinguishARippleOfTheTorqueSensorFromOneOfTheMotor) {
   expect_named("torque_sensor_ripple", 1.0, 0.0);
@@ -48,7 +47,7 @@ TEST(OtherBalances, DistinguishARippleOfTheTorqueSensorFromOneOfTheMotor) {
 // A stiffness that hardens, and a ripple of the motor: each balance lacks an effect of its own.
 TEST(OtherBalances, AreEachNamedWhatTheyLack) {
   std::size_t both = 0;
-  const auto seeds = in_campaign<std::uint64_t>(2, 4);
+  const auto seeds = in_campaign<std::uint64_t>(1, 4);
   for (std::uint64_t seed = kFirstSeed + 200; seed < kFirstSeed + 200 + seeds; ++seed) {
     const HiddenTwin twin("cubic_stiffness", 2.0, seed, 0.0);
     model::Model base = twin.base;

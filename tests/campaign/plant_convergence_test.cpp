@@ -126,7 +126,7 @@ TEST_P(PlantConvergence, AStepOfAnEighthOfAMillisecondDiffersByLessThanSensorsCa
   EXPECT_LT(worst.output, kShareOfCount);
 }
 
-INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(tests::part_of(hidden_effects(), 4)),
+INSTANTIATE_TEST_SUITE_P(Hidden, PlantConvergence, ::testing::ValuesIn(tests::part_of(hidden_effects(), 8)),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::replace_if(

@@ -49,6 +49,9 @@ TEST(StrongSaturation, OfTheTorqueConstantIsTheLikeliestEffectAndHasItsCoefficie
   ASSERT_FALSE(diagnosis.candidates.empty());
   const Candidate& first = diagnosis.candidates.front();
   EXPECT_EQ(first.effect, "torque_constant_saturation");
+  ASSERT_EQ(diagnosis.named.size(), 1U);
+  EXPECT_EQ(diagnosis.named.front().effect, "torque_constant_saturation");
+  EXPECT_TRUE(diagnosis.untried_advice.empty()) << "the current is measured";
   ASSERT_FALSE(first.parameters.empty());
   EXPECT_NEAR(first.parameters.front().value, kPerA2, 0.05 * kPerA2);
 }

@@ -61,7 +61,6 @@ Outcome run(const Case& c) {
   Outcome outcome;
   outcome.what = c;
   plant::PlantFile demo = plant::demo_plant();
-  const double floor = floor_of(demo, c.seed);
   if (!c.truth.hidden.empty()) plant::hide(demo.drive, c.truth.hidden, c.truth.scale);
   const data::Dataset dataset = tests::dataset_of(demo.drive, plant::record_all(demo.drive, demo.experiments, c.seed));
   const model::Model base = tests::model_of(demo.drive, false, false);
@@ -80,6 +79,7 @@ Outcome run(const Case& c) {
     selection::UserDefinition made;
     made.balance = d.unknown->definition.balance;
     const selection::Addition added = selection::add(dataset, base, d.unknown->effect, {}, made);
+    const double floor = floor_of(plant::demo_plant(), c.seed);
     outcome.before = *added.before.rmse_holdout / floor;
     outcome.after = *added.after.rmse_holdout / floor;
   }
@@ -152,15 +152,7 @@ TEST(UnknownEffects, AreFlaggedOrGivenTheNameOfTheirClassAndTheirCurveTakesTheEr
   EXPECT_LT(after.back(), 1.6);
 }
 
-TEST(UnknownEffects, AreNotSeenWhereNothingIsMissing) {
-  std::vector<Case> cases;
-  for (std::uint64_t seed = 7003; seed <= tests::in_campaign<std::uint64_t>(7003, 7004); ++seed)
-    cases.push_back({{}, seed});
-  for (const Outcome& o : run_all(cases)) {
-    EXPECT_FALSE(o.flagged) << o.what.seed << " " << o.curve;
-    EXPECT_TRUE(o.curve.empty());
-  }
-}
+// Where nothing is missing, hidden_effects_test.cpp expects that none is seen.
 
 // Seeds to tune on, for whoever changes a limit: FLEXSPLINE_TUNE=1 runs these alone.
 TEST(UnknownEffects, TuningSeeds) {

@@ -48,5 +48,20 @@ TEST(Dev, CountsATestDuringWhichItsProcessEndedAsFailed) {
   EXPECT_TRUE(contains(answer.out, "  Script\n")) << answer.out;
 }
 
+TEST(Dev, ListsTheTestsThatTookLongestAndHowLongAllTook) {
+  const Shell shell;
+  shell.write("report.xml",
+              "<testsuite name=\"(empty)\"\n\ttests=\"3\"\n\ttime=\"7\"\n\t>\n"
+              "\t<testcase name=\"A,B\" classname=\"A,B\" time=\"3.6\" status=\"run\">\n"
+              "[==========] Running 2 tests from 2 test suites.\n[ RUN      ] A.One\n[       OK ] A.One (3500 ms)\n"
+              "[ RUN      ] B.Two\n[       OK ] B.Two (10 ms)\n\t</testcase>\n"
+              "\t<testcase name=\"Script\" classname=\"Script\" time=\"2.04\" status=\"run\">\n\t</testcase>\n"
+              "\t<testcase name=\"Other\" classname=\"Other\" time=\"11.5\" status=\"run\">\n\t</testcase>\n");
+  const std::string said =
+      shell.must("awk -v dearest=2 -f '" + (kRoot / "tests/support/ctest_summary.awk").string() + "' report.xml");
+  EXPECT_TRUE(contains(said, "report.xml: 7 s of tests\n")) << said;
+  EXPECT_TRUE(contains(said, "Dearest:\n   11.5 s  Other\n    3.5 s  A.One\n\n4 passed")) << said;
+}
+
 }  // namespace
 }  // namespace flexspline::cli_test::dev_test

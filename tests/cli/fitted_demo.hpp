@@ -10,8 +10,7 @@ class FittedDemo : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     shell_ = new Shell;
-    shell_->record();
-    shell_->must("flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml");
+    shell_->record_and_identify();
   }
   static void TearDownTestSuite() {
     delete shell_;

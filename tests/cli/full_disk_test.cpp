@@ -9,26 +9,25 @@ namespace {
 TEST(FullDisk, EveryCommandThatAnswersOnStandardOutputExitsNonZeroAndSaysWhy) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
   const Shell shell;
-  shell.record();
-  const std::string model = " --model demo-out/base-model.toml ";
-  shell.must("flexspline identify demo-out" + model + "--out fitted.toml");
+  shell.record_and_identify();
+  const std::string model = " --model demo-out/base-model.toml ", run = " demo-out/free-sine-1hz.csv";
   shell.must("flexspline pack --model fitted.toml --out drive.block");
   const std::string lines[] = {"flexspline export --model fitted.toml --as c",
                                "flexspline export --model fitted.toml --as urdf",
                                "flexspline export --protocol-header",
-                               "flexspline identify demo-out" + model,
-                               "flexspline identify demo-out --json -" + model,
+                               "flexspline identify" + run + model,
+                               "flexspline identify" + run + " --json -" + model,
                                "flexspline unpack drive.block",
                                "flexspline effects",
                                "flexspline effects inertia",
                                "flexspline effects --json -",
                                "flexspline drives",
                                "flexspline pack --model fitted.toml --out again.block",
-                               "flexspline check demo-out",
-                               "flexspline measure demo-out",
-                               "flexspline compare --model fitted.toml demo-out",
-                               "flexspline simulate --model fitted.toml demo-out --out simulated",
-                               "flexspline new --from demo-out --out project",
+                               "flexspline check" + run,
+                               "flexspline measure" + run,
+                               "flexspline compare --model fitted.toml" + run,
+                               "flexspline simulate --model fitted.toml" + run + " --out simulated",
+                               "flexspline new --from" + run + " --out project",
                                "flexspline completion bash",
                                "flexspline man",
                                "flexspline --help",

@@ -48,8 +48,7 @@ TEST(Json, IdentifyGivesEstimatesNearTheTruth) {
 
 TEST(Json, CompareGivesEverySignalOfEveryExperiment) {
   const Shell shell;
-  shell.record();
-  shell.must("flexspline identify demo-out --model demo-out/base-model.toml --out fitted.toml");
+  shell.record_and_identify();
   const nlohmann::json found = shell.json("flexspline compare --model fitted.toml demo-out");
   EXPECT_EQ(found["format"], "flexspline-compare/1");
   expect_fields(found, {"experiments", "overall", "regions", "parameter_trends"});
@@ -67,7 +66,11 @@ TEST(Json, CompareGivesEverySignalOfEveryExperiment) {
 TEST(Json, DiagnoseNamesWhatIsHidden) {
   const Shell shell;
   shell.record("viscous_asymmetry");
-  const nlohmann::json found = shell.json("flexspline diagnose --model demo-out/base-model.toml demo-out");
+  const Answer answer = shell.run("flexspline diagnose --model demo-out/base-model.toml demo-out --json found.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_FALSE(contains(answer.out, "\x1b")) << "escape codes away from a terminal";
+  EXPECT_FALSE(contains(answer.err, "\x1b"));
+  const nlohmann::json found = nlohmann::json::parse(shell.file("found.json"));
   EXPECT_EQ(found["format"], "flexspline-diagnose/1");
   expect_fields(found, {"verdict", "named", "balance", "base", "localised", "candidates", "parameter_trends",
                         "friction_drift", "recovered_percent", "remaining_structure", "disturbances", "rounds"});
@@ -89,7 +92,9 @@ TEST(Json, DiagnoseNamesWhatIsHidden) {
 TEST(Json, AutoDiagnosisGivesARoundForEachEffectAdded) {
   const Shell shell;
   shell.record("viscous_asymmetry");
-  const nlohmann::json found = shell.json("flexspline diagnose --auto --model demo-out/base-model.toml demo-out");
+  const nlohmann::json found = shell.json(
+      "flexspline diagnose --auto --model demo-out/base-model.toml demo-out/free-sine-1hz.csv "
+      "demo-out/locked-sine-0.5hz.csv demo-out/rest.csv");
   ASSERT_GE(found["rounds"].size(), 2u);
   ASSERT_GE(found["named"].size(), 1u);
   EXPECT_EQ(found["named"][0]["effect"], "viscous_asymmetry");

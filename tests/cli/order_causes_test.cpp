@@ -69,7 +69,10 @@ TEST(OrderCausesOfARecording, WithoutThePolePairsTheHintSaysWhatToState) {
   const Shell shell;
   shell.record("torque_ripple:24");
   state(shell, "");
-  const json ripple = candidate_of(shell.json("flexspline diagnose --model model.toml demo-out"), 24.0);
+  const json ripple = candidate_of(
+      shell.json("flexspline diagnose --model model.toml demo-out/free-slow-warm.csv demo-out/free-sine-0.3hz-warm.csv "
+                 "demo-out/free-sine-1hz.csv demo-out/rest.csv"),
+      24.0);
   EXPECT_EQ(ripple["order_causes"], json::array());
   EXPECT_TRUE(contains(ripple["order_hint"].get<std::string>(), "pole_pairs and motor_slots"));
   const Answer refused = [&] {

@@ -100,7 +100,7 @@ TEST_F(Report, OfCompareShowsSixteenFreeRunsAndBlackBoxesOnOnePage) {
 
 TEST_F(Report, OfDiagnoseHoldsTheCandidates) {
   const nlohmann::json document =
-      page_of("flexspline diagnose --model demo-out/base-model.toml demo-out --json d.json", "d.html");
+      page_of(std::string("flexspline diagnose --model demo-out/base-model.toml --json d.json ") + kData, "d.html");
   const nlohmann::json found = nlohmann::json::parse(shell_.file("d.json"));
   ASSERT_EQ(document["rounds"].size(), 1u);
   EXPECT_EQ(document["rounds"][0]["named"], found["named"]);
@@ -119,13 +119,16 @@ TEST_F(Report, OfAddShowsTheErrorBeforeAndAfter) {
 }
 
 TEST_F(Report, OfTheDemoStandsBesideItsModels) {
-  const nlohmann::json answer = shell_.json("flexspline demo --hidden viscous_asymmetry --seed 1 --out story");
-  EXPECT_EQ(answer["report"], "story/report.html");
-  const std::string page = shell_.file("story/report.html");
+  const std::string example = "flexspline demo --hidden stribeck_gaussian --seed 7 --out demo-out";
+  ASSERT_TRUE(contains(shell_.must("flexspline demo --help"), example));
+  const Shell shell;
+  const nlohmann::json answer = shell.json(example);
+  EXPECT_EQ(answer["report"], "demo-out/report.html");
+  const std::string page = shell.file("demo-out/report.html");
   expect_loads_nothing(page);
   EXPECT_LT(page.size(), 3'000'000u);
   const nlohmann::json document = document_in(page);
-  EXPECT_EQ(document["addition"]["effect"], "viscous_asymmetry");
+  EXPECT_EQ(document["addition"]["effect"], "stribeck_gaussian");
   EXPECT_EQ(document["headline"]["error"], answer["error_after"]);
 }
 

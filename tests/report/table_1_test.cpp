@@ -54,7 +54,7 @@ void expect_within_three_percent(const estimation::Identification& found) {
 }
 
 TEST_F(Table1, LinearEstimatesAreWithinThreePercent) {
-  for (std::uint64_t seed = 7001; seed < 7009; ++seed) {
+  for (std::uint64_t seed = 7001; seed < in_campaign<std::uint64_t>(7004, 7009); ++seed) {
     SCOPED_TRACE(seed);
     expect_within_three_percent(*linear(seed, cutoff(10.0)));
   }
@@ -122,7 +122,7 @@ FreeRunFit stribeck_of(const rhs100::Set& saw_tooth, const estimation::Identific
 TEST_F(Table1, TheFreeRunOnTheSlowSawToothIdentifiesAmplitudeAndSpeed) {
   const report::DirectionalFriction& truth = kTruth.friction.positive;
   std::vector<std::future<FreeRunFit>> fits;
-  for (std::uint64_t seed = 7001; seed < in_campaign<std::uint64_t>(7003, 7005); ++seed) {
+  for (std::uint64_t seed = 7001; seed < in_campaign<std::uint64_t>(7002, 7005); ++seed) {
     fits.push_back(std::async(std::launch::async,
                               [this, seed] { return stribeck_of(saw_tooth, *linear(seed, cutoff(10.0)), seed); }));
   }
@@ -136,10 +136,10 @@ TEST_F(Table1, TheFreeRunOnTheSlowSawToothIdentifiesAmplitudeAndSpeed) {
     speeds.push_back(fit.values[1]);
     claimed.push_back(0.25 * (fit.high[1] - fit.low[1]));
   }
-  // Two intervals of 95 % both miss in 0.3 % of all such runs, two of four in 1.4 %.
+  // Of seeds of which one interval of 95 % misses there are 5 %, of those of which two of four miss 1.4 %.
   EXPECT_GE(covered, in_campaign(1, 3));
   if (!whole_campaigns()) return;
-  // What the intervals claim is what the estimates scatter by, which two estimates do not show.
+  // What the intervals claim is what the estimates scatter by, which one estimate does not show.
   EXPECT_LT(spread_percent(speeds), 2.5 * 100.0 * mean(claimed) / mean(speeds));
   EXPECT_GT(spread_percent(speeds), 0.4 * 100.0 * mean(claimed) / mean(speeds));
 }

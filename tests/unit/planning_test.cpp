@@ -220,6 +220,7 @@ TEST(Planning, ALockedOutputThatTheDataShowIsProposedWithoutAGearAsWell) {
 TEST(Planning, TwoTemperaturesAreRehearsedOnlyForAModelOrAnEffectThatDependsOnThem) {
   const model::Model m = a_drive();
   PlanRequest q = request_for(m);
+  q.setting.run_s = 1.0;
   q.setting.temperature = true;
   const auto warm = [](const RehearsedMotions& rehearsed) {
     return any(rehearsed.motions(), [](const planning::Run& r) { return r.temperature_c.has_value(); });

@@ -14,38 +14,29 @@ namespace {
 
 using data::Column;
 
-// An axis whose motor makes less torque than its current says, by the cube of the current; 20 A at most. `effort` is
-// what its log has: the current, or the current times 0.05 N m/A.
-Diagnosis diagnosis_of(Column effort) {
+// An axis whose motor makes less torque than its current says, by the cube of the current; 20 A at most. Its log has
+// the current times 0.05 N m/A. With the current itself: tests/campaign/strong_saturation_test.cpp.
+Diagnosis diagnosis_of_torque() {
   constexpr double kNmPerA = 0.05;
   data::Dataset dataset;
   std::mt19937_64 random(9);
   std::normal_distribution<double> noise(0.0, 1e-3);
   for (const double hz : {0.3, 0.5, 0.8, 1.0})
     dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(hz), 4e-3, 3000, [&](double t, data::Experiment& e) {
+        tests::written_experiment(std::to_string(hz), 4e-3, 1500, [&](double t, data::Experiment& e) {
           const double rate = kTurn * hz, q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t);
           const double torque = -8e-4 * rate * rate * q + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0);
           const double linear_a = torque / kNmPerA, current = linear_a + 3e-4 * std::pow(linear_a, 3) + noise(random);
           e[Column::motor_position].push_back(q);
-          e[effort].push_back(effort == Column::current ? current : kNmPerA * current);
+          e[Column::motor_torque].push_back(kNmPerA * current);
         }));
-  model::Model model = tests::plain_model();
-  if (effort == Column::current) model.drive.torque_constant_nm_a.value = kNmPerA;
-  return diagnose(dataset, model, {});
+  return diagnose(dataset, tests::plain_model(), {});
 }
 
 TEST(UntriedEffects, AreThoseOfTheCurrentWhereTheEffortIsATorqueAndMoreIsMissing) {
-  const Diagnosis torque = diagnosis_of(Column::motor_torque);
+  const Diagnosis torque = diagnosis_of_torque();
   EXPECT_NE(torque.untried_advice.find("torque_constant_saturation"), std::string::npos);
   EXPECT_NE(torque.untried_advice.find("map it as current_a"), std::string::npos);
-}
-
-TEST(UntriedEffects, AreNoneWhereTheCurrentIsMeasured) {
-  const Diagnosis current = diagnosis_of(Column::current);
-  EXPECT_TRUE(current.untried_advice.empty());
-  ASSERT_EQ(current.named.size(), 1U);
-  EXPECT_EQ(current.named.front().effect, "torque_constant_saturation");
 }
 
 }  // namespace

@@ -249,7 +249,7 @@ TEST(MachineSignals, LeastSquaresLeavesWhatIsOrthogonal) {
 
 TEST(Machines, WhatIsHiddenRaisesTheErrorAsWantedWhereThatIsPlausible) {
   int close = 0, hidden = 0;
-  for (std::uint64_t seed = 500; seed < 508; ++seed) {
+  for (std::uint64_t seed = 500; seed < 504; ++seed) {
     const Machine m = machine_of(seed, kKinds[seed % kKinds.size()], false);
     if (!m.hidden) continue;
     const Account account = account_of(m, run_all(m, m.fit));

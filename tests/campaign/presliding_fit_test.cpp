@@ -10,7 +10,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection::selection_presliding_fit_test {
+namespace flexspline::selection::presliding_fit_test {
 namespace {
 
 using data::Column;
@@ -45,8 +45,10 @@ TEST(PreslidingFit, HasTheTravelAndTheFrictionOfAllSamplesAndTheErrorsThatItTake
   EXPECT_TRUE(law->admissible);
   EXPECT_NE(law->note.find("around reversals"), std::string::npos);
   for (const estimation::Estimate& e : law->parameters) {
-    if (e.parameter == "torque") EXPECT_NEAR(e.value, kFriction, 0.01 * kFriction);
-    if (e.parameter == "presliding") EXPECT_NEAR(e.value, kTravel, 0.05 * kTravel);
+    const double truth = e.parameter == "torque" ? kFriction : kTravel;
+    if (e.parameter == "torque" || e.parameter == "presliding") {
+      EXPECT_NEAR(e.value, truth, (e.parameter == "torque" ? 0.01 : 0.05) * truth);
+    }
   }
   EXPECT_LT(law->rmse_cv_after, 0.3 * law->rmse_cv_before);
   EXPECT_GT(law->chi2_decrease_percent, 90.0);
@@ -54,4 +56,4 @@ TEST(PreslidingFit, HasTheTravelAndTheFrictionOfAllSamplesAndTheErrorsThatItTake
 }
 
 }  // namespace
-}  // namespace flexspline::selection::selection_presliding_fit_test
+}  // namespace flexspline::selection::presliding_fit_test

@@ -10,7 +10,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection::selection_grid_of_halves_test {
+namespace flexspline::selection::grid_of_halves_test {
 namespace {
 
 using data::Column;
@@ -54,4 +54,4 @@ TEST_P(GridOfHalves, HasAValueNearThatOfTheLaw) {
 INSTANTIATE_TEST_SUITE_P(Velocities, GridOfHalves, ::testing::Values(1.0, 2.0, 3.0, 4.5, 7.0, 10.0));
 
 }  // namespace
-}  // namespace flexspline::selection::selection_grid_of_halves_test
+}  // namespace flexspline::selection::grid_of_halves_test
