@@ -66,7 +66,7 @@ int run(const DiagnoseOptions& options, Console& console) {
       console.line();
       console.line(console.bold(fmt::format("Round {}", ++round)));
     }
-    output::print_diagnosis(console, found, add_command(options), &file.model.drive);
+    output::print_diagnosis(console, found, add_command(options), &file.model.drive, &dataset);
   };
   const selection::StepwiseSelection done =
       selection::add_until_complete(dataset, file.model, how, options.all ? kMostRounds : 1, print);

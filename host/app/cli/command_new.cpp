@@ -84,12 +84,10 @@ int run(const NewOptions& options, Console& console) {
   console.line(fmt::format("{} and {} are written. Next:", dataset_file.string(), model_file.string()));
   const std::string out = quoted(options.request.out.string());
   const std::string fitted = quoted((options.request.out / "fitted.toml").string());
-  const std::string tolerate = tolerate_arguments(options.request.tolerate);
-  console.line(fmt::format("  flexspline check {}{}", out, tolerate));
-  console.line(fmt::format("  flexspline identify {} --model {} --out {}{}", out, quoted(model_file.string()), fitted,
-                           tolerate));
-  console.line(fmt::format("  flexspline compare --model {} {}{}", fitted, out, tolerate));
-  console.line(fmt::format("  flexspline diagnose --model {} {}{}", fitted, out, tolerate));
+  console.line(fmt::format("  flexspline check {}", out));
+  console.line(fmt::format("  flexspline identify {} --model {} --out {}", out, quoted(model_file.string()), fitted));
+  console.line(fmt::format("  flexspline compare --model {} {}", fitted, out));
+  console.line(fmt::format("  flexspline diagnose --model {} {}", fitted, out));
   output::save_json(options.json, json_of(options, draft, base));
   return kDone;
 }

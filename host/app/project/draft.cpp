@@ -236,7 +236,14 @@ void turn(HeaderGuess& guess, const std::vector<std::string>& turned) {
   }
 }
 
+bool has(const std::vector<std::string>& list, std::string_view text) {
+  return std::ranges::find(list, text) != list.end();
+}
+
 void add_stated_facts(Draft& draft, const Request& request) {
+  for (const data::KindInfo& kind : data::known_kinds())
+    if (kind.tolerable && has(request.tolerate, kind.name) && !has(draft.toml.tolerate, kind.name))
+      draft.toml.tolerate.emplace_back(kind.name);
   if (!request.axis.empty()) draft.toml.drive["axis"] = text_value(request.axis);
   if (!request.load.empty()) {
     // One line for each experiment, where a user corrects it for one of them.

@@ -8,6 +8,7 @@
 #include "host/common/system/temporary_folder.hpp"
 #include "host/input/data/period.hpp"
 #include "host/input/data/record_summary.hpp"
+#include "host/input/data/record_time.hpp"
 #include "host/output/answers/text.hpp"
 #include "host/physics/model/text.hpp"
 
@@ -104,8 +105,8 @@ void split(Draft& draft, const data::Dataset& dataset) {
   second.keys["experiment"] = text_value(e.name + "-holdout");
   second.keys["role"] = text_value("holdout");
   draft.toml.experiments = {first, second};
-  draft.notes.push_back(
-      fmt::format("\"{}\" is split at {:g} s into a part to fit and a part to verify; {}", e.name, at_s, cut->why));
+  draft.notes.push_back(fmt::format("\"{}\" is split at {} into a part to fit and a part to verify; {}", e.name,
+                                    data::time_text(e, at_s), cut->why));
 }
 
 std::string key_line(const std::string& key, const data::KeyValue& value) {
@@ -196,7 +197,11 @@ std::vector<std::string> implausible_sides(const Draft& draft, const data::Datas
 }
 
 std::string text_of(const Draft& draft, const fs::path& folder) {
-  std::string text = "format = \"flexspline-dataset/1\"\n\n[drive]\n";
+  std::string text = "format = \"flexspline-dataset/1\"\n";
+  std::string kinds;
+  for (const std::string& kind : draft.toml.tolerate) kinds += (kinds.empty() ? "" : ", ") + model::toml_string(kind);
+  if (!kinds.empty()) text += fmt::format("tolerate = [{}]\n", kinds);
+  text += "\n[drive]\n";
   for (const auto& [key, value] : draft.toml.drive)
     text += key_line(key, value) +
             remark(key == "axis"         ? draft.axis_comment

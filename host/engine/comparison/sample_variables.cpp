@@ -5,6 +5,8 @@
 #include <functional>
 #include <limits>
 
+#include "host/input/data/record_time.hpp"
+
 namespace flexspline::comparison {
 namespace {
 
@@ -97,7 +99,8 @@ std::vector<SampleVariable> sample_variables(const RegressionProblem& data, data
       [&](const Record& r, std::size_t k) { return r.has_temperature ? r.inputs.temperature_at(k) : kNone; });
   if (!variables.empty() && variables.back().name == "temperature")
     variables.back().narrowest_bin = kNarrowestTemperature_c;
-  add("time", "s", [&](const Record& r, std::size_t k) { return r.experiment->time_s[k]; });
+  add("time", "s",
+      [&](const Record& r, std::size_t k) { return r.experiment->time_s[k] - data::start_of_times(*r.experiment); });
   const Record* travelled = nullptr;
   std::vector<double> travel;
   add("travel", position, [&](const Record& r, std::size_t k) {

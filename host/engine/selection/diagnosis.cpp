@@ -241,6 +241,15 @@ void list_untried(const estimation::PreparedData& prepared, Diagnosis& result) {
       names);
 }
 
+// Names that the last steps took back leave a verdict that is not theirs.
+void follow_taken_back(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, const CandidateFit* likeliest,
+                       Diagnosis& result) {
+  const auto described =
+      std::ranges::find_if(all, [&](const SearchedBalance& e) { return e.search.data->balance() == result.balance; });
+  if (described != all.end() && follow_names(*described, result))
+    check_unknown_structure(described->search, &*described == &chosen ? likeliest : nullptr, result);
+}
+
 // The steps depend on each other through `result`:
 //   name_effects                   writes verdict, balance, errors, candidates, named, possible, partial
 //   take_back_unconfirmed_scaling  reads named and verdict; takes names back
@@ -250,6 +259,7 @@ void list_untried(const estimation::PreparedData& prepared, Diagnosis& result) {
 //   look_between_records           reads named; may name what differs between records, and the motor's balance with it
 //   name_on_other_balances         reads named and verdict; appends names of the other balances
 //   refit_presliding, take_back_insignificant   change values and names by what was found before
+//   follow_taken_back              reads named; writes verdict where a name was taken back, and may find a structure
 // At the cut-off and the mask of the options: fits the model, chooses the balance where most is missing, names what it
 // lacks, tests the names against what differs between records, and says what is left.
 Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, const Options& options) {
@@ -295,6 +305,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
                          result);
   refit_presliding(dataset, model, options, chosen.motor, result);
   take_back_insignificant(result);
+  follow_taken_back(all, balance, likeliest, result);
   explain_orders(base->model.drive, result);
   assess_excitation(chosen.moves, result);
   list_untried(base->prepared, result);

@@ -67,21 +67,8 @@ bool halves_show_unknown_structure(const Diagnosis& result) {
          std::ranges::any_of(result.resampling->found, &Resampling::FoundTerm::is_unknown_structure);
 }
 
-}  // namespace
-
-void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
-  const CandidateFit* named = result.named.empty() ? nullptr : candidate_named(chosen, result.named.front());
-  const CrossValidatedFit& after = named ? named->fit : chosen.search.base;
-  // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
-  // says how large it is.
-  const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
-    return is_delay_of_current(catalogue::get(n.effect));
-  });
-  const Eigen::Index delay = after.theta.size() - 1;
-  if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
-      std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
-    result.delay_s = after.theta[delay];
-  add_drifts(chosen, after, result);
+// What is above the noise with the named effect in the model, and the verdict where none is named.
+void assess_verdict(const SearchedBalance& chosen, const CrossValidatedFit& after, Diagnosis& result) {
   const bool at_floor = result.noise_floor && after.rmse() < kPolicy.at_floor * *result.noise_floor;
   bool enough = true;
   if (result.noise_floor && !result.named.empty()) {
@@ -103,6 +90,35 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
     result.verdict = Verdict::unknown_structure;
   else
     result.verdict = Verdict::nothing_significant;
+}
+
+}  // namespace
+
+void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
+  const CandidateFit* named = result.named.empty() ? nullptr : candidate_named(chosen, result.named.front());
+  const CrossValidatedFit& after = named ? named->fit : chosen.search.base;
+  // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
+  // says how large it is.
+  const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
+    return is_delay_of_current(catalogue::get(n.effect));
+  });
+  const Eigen::Index delay = after.theta.size() - 1;
+  if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
+      std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
+    result.delay_s = after.theta[delay];
+  add_drifts(chosen, after, result);
+  assess_verdict(chosen, after, result);
+}
+
+bool follow_names(const SearchedBalance& chosen, Diagnosis& result) {
+  if (result.verdict != Verdict::missing_effect && result.verdict != Verdict::confusable_effects) return false;
+  if (result.named.size() == 1) result.verdict = Verdict::missing_effect;
+  if (!result.named.empty()) return false;
+  // They were of the effect that was named.
+  result.recovered_percent.reset();
+  result.remaining_structure.clear();
+  assess_verdict(chosen, chosen.search.base, result);
+  return true;
 }
 
 }  // namespace flexspline::selection

@@ -9,6 +9,9 @@ namespace flexspline::selection {
 // Sets the remaining structure, the recovered share, the delay, drifts, and, where nothing is named, the verdict.
 void assess_remainder(const SearchedBalance& chosen, Diagnosis& result);
 
+// The verdict of the names that are left where some were taken back after it was made. Returns whether none is.
+bool follow_names(const SearchedBalance& chosen, Diagnosis& result);
+
 // Friction that differs between runs more than `fit` explains, with a warning each.
 void add_drifts(const SearchedBalance& balance, const CrossValidatedFit& fit, Diagnosis& result);
 

@@ -65,7 +65,9 @@ std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
   const Candidate* const candidate = candidate_of_name(result, name);
   if (!candidate) return {};
   if (has_unresolved_travel(*candidate))
-    return "the interval of its travel holds zero: an axis that only sticks looks like it";
+    return "the travel of presliding is too short for these samples to be distinguished from an axis that sticks at "
+           "each "
+           "reversal";
   if (is_confirmed_by_held_out(result, name)) return {};
   if (const std::optional<std::string> shape = undetermined_shape(*candidate))
     return fmt::format("the interval of its {} is all that is possible", *shape);

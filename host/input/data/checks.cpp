@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "host/input/data/record_time.hpp"
 #include "host/input/data/units.hpp"
 
 namespace flexspline::data {
@@ -111,15 +112,14 @@ void check_clipping(Experiment& experiment, Findings& findings) {
       std::fill(experiment.masked.begin() + static_cast<std::ptrdiff_t>(run.first),
                 experiment.masked.begin() + static_cast<std::ptrdiff_t>(run.last), std::uint8_t{1});
     const Segment& first = runs.at_extremes.front();
-    findings.add(
-        Severity::warning, "clipping", experiment.file.string(), 0, std::string(column_name(column)),
-        fmt::format("in \"{}\" it is at exactly {:.6g} for {} samples from {:.6g} s on, {} samples ({:.2g} %) in "
-                    "{} such places; those samples are masked",
-                    experiment.name, signal[first.first], first.last - first.first, experiment.time_s[first.first],
-                    runs.extreme_samples,
-                    100.0 * static_cast<double>(runs.extreme_samples) / static_cast<double>(signal.size()),
-                    runs.at_extremes.size()),
-        "raise the limit or the sensor's range, or move more gently");
+    findings.add(Severity::warning, "clipping", experiment.file.string(), 0, std::string(column_name(column)),
+                 fmt::format("in \"{}\" it is at exactly {:.6g} for {} samples from {} on, {} samples ({:.2g} %) in "
+                             "{} such places; those samples are masked",
+                             experiment.name, signal[first.first], first.last - first.first,
+                             time_text(experiment, experiment.time_s[first.first]), runs.extreme_samples,
+                             100.0 * static_cast<double>(runs.extreme_samples) / static_cast<double>(signal.size()),
+                             runs.at_extremes.size()),
+                 "raise the limit or the sensor's range, or move more gently");
   }
 }
 

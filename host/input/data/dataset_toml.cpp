@@ -41,8 +41,10 @@ class Reader {
         each(node, "[columns]", [&](std::string_view k, const Node& v) { column(k, v); });
       else if (key == "experiment")
         experiments(node);
+      else if (key == "tolerate")
+        tolerate(node);
       else
-        unknown(node, key, text::nearest(key, {"format", "drive", "columns", "experiment"}));
+        unknown(node, key, text::nearest(key, {"format", "tolerate", "drive", "columns", "experiment"}));
     }
     return std::move(toml_);
   }
@@ -165,6 +167,16 @@ class Reader {
       findings_.add(Severity::error, "key", file(), mapping.line, std::string(name), "scale is zero",
                     "give the factor from their unit to ours, or leave scale out");
     toml_.columns.insert_or_assign(std::string(name), mapping);
+  }
+
+  void tolerate(const Node& node) {
+    if (node.kind != NodeKind::array) {
+      wrong_type(node, "tolerate", "a list of kinds: tolerate = [\"jitter\"]");
+      return;
+    }
+    for (const Node& kind : node.items)
+      if (std::string name = text("tolerate", kind); !name.empty()) toml_.tolerate.push_back(std::move(name));
+    findings_.check_kinds(toml_.tolerate, file(), node.line);
   }
 
   void experiments(const Node& node) {

@@ -32,6 +32,7 @@ struct ExperimentEntry {
 
 struct DatasetToml {
   std::filesystem::path file;
+  std::vector<std::string> tolerate;             // kinds of findings that are warnings then, as `--tolerate` has them
   KeyMap drive;                                  // [drive]: keys of the drive
   KeyMap defaults;                               // [drive]: keys of experiments that hold for all of them
   std::map<std::string, ColumnMapping> columns;  // by our name, "time_s" included

@@ -11,6 +11,7 @@
 
 #include "host/common/signals/quantum.hpp"
 #include "host/input/data/checks.hpp"
+#include "host/input/data/record_time.hpp"
 #include "host/input/data/time_base.hpp"
 
 namespace flexspline::data {
@@ -54,7 +55,7 @@ class ExperimentReader {
   bool fail_too_few(const TimeBounds& bounds) {
     const std::string range =
         bounds.from_s || bounds.to_s
-            ? fmt::format(" from {} to {} s (the file's time goes from {:.6g} to {:.6g} s)",
+            ? fmt::format(" from {} to {} s (the file's time goes from {:.15g} to {:.15g} s)",
                           bounds.from_s ? fmt::format("{}", *bounds.from_s) : "its start",
                           bounds.to_s ? fmt::format("{}", *bounds.to_s) : "its end", file_begin_, file_end_)
             : "";
@@ -208,10 +209,11 @@ class ExperimentReader {
                                        : "; --tolerate time_not_increasing uses lines that are repeated exactly once";
       const std::string swapped = tolerated ? "" : "; --tolerate time_not_increasing sorts lines that are swapped";
       // It cannot be tolerated here, as the order of the samples is unknown.
-      findings_.fail_later("time_not_increasing", file_, table_.line(rows_[i]), plan_.wanted_names[plan_.time_column],
-                           fmt::format("{}the time {:.9g} s comes after {:.9g} s", table_.place(rows_[i]), now, before),
-                           now == before ? "log time with more digits, or take repeated lines out" + repeated
-                                         : "if recordings follow each other in this file, split it" + swapped);
+      findings_.fail_later(
+          "time_not_increasing", file_, table_.line(rows_[i]), plan_.wanted_names[plan_.time_column],
+          fmt::format("{}the time {:.15g} s comes after {:.15g} s", table_.place(rows_[i]), now, before),
+          now == before ? "log time with more digits, or take repeated lines out" + repeated
+                        : "if recordings follow each other in this file, split it" + swapped);
       return false;
     }
     return true;
@@ -252,8 +254,12 @@ class ExperimentReader {
 
     if (base.jitter > kJitterShare) {
       const bool tolerated = findings_.tolerates("jitter");
-      findings_.add(Severity::error, "jitter", file_, 0, "time_s", jitter_text(base),
-                    tolerated ? "resampled nevertheless" : "log with a fixed sample rate; --tolerate jitter resamples");
+      findings_.add(
+          Severity::error, "jitter", file_, 0, "time_s", jitter_text(base),
+          tolerated
+              ? "resampled nevertheless"
+              : "log with a fixed sample rate; --tolerate jitter resamples, and new --tolerate jitter keeps it in "
+                "dataset.toml");
       if (!tolerated) return false;
     } else if (base.jitter_max >= kUniformShare) {
       findings_.add(Severity::warning, "jitter", file_, 0, "time_s", jitter_text(base) + "; resampled evenly",
@@ -276,11 +282,11 @@ class ExperimentReader {
 
   void report_gaps(const TimeBase& base) {
     if (base.segments.size() > 1)
-      findings_.add(
-          Severity::warning, "gap", file_, 0, "time_s",
-          fmt::format("\"{}\" has {} gaps, the longest {:.4g} s after {:.6g} s: {} segments", experiment_.name,
-                      base.segments.size() - 1, base.longest_gap_s, base.longest_gap_at_s, base.segments.size()),
-          "nothing is filtered across them; find out why samples are lost");
+      findings_.add(Severity::warning, "gap", file_, 0, "time_s",
+                    fmt::format("\"{}\" has {} gaps, the longest of {:.4g} s at {}: {} segments", experiment_.name,
+                                base.segments.size() - 1, base.longest_gap_s,
+                                time_text(experiment_, base.longest_gap_at_s), base.segments.size()),
+                    "nothing is filtered across them; find out why samples are lost");
     if (base.lost_samples > 0)
       findings_.add(Severity::warning, "gap", file_, 0, "time_s",
                     fmt::format("in \"{}\" {} samples are missing in places of one or two; they were interpolated",

@@ -67,29 +67,36 @@ std::string tolerable_kinds() {
 }
 
 Findings::Findings(std::vector<std::string> tolerate) : tolerate_(std::move(tolerate)) {
-  for (const std::string& name : tolerate_) {
+  check_kinds(tolerate_);
+}
+
+void Findings::check_kinds(const std::vector<std::string>& kinds, const std::string& file, std::size_t line) {
+  for (const std::string& name : kinds) {
     const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const KindInfo& k) { return k.name == name; });
     if (kind == kKinds.end()) {
       std::vector<std::string_view> names;
       for (const KindInfo& k : kKinds) names.push_back(k.name);
       const std::string near = text::nearest(name, names);
-      add(Severity::error, "tolerate", "", 0, "",
+      add(Severity::error, "tolerate", file, line, "",
           fmt::format("no finding is of kind \"{}\"{}", name,
                       near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)),
           fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));
     } else if (!kind->tolerable && kind->severity == Severity::error) {
-      add(Severity::error, "tolerate", "", 0, "",
+      add(Severity::error, "tolerate", file, line, "",
           fmt::format("\"{}\" cannot be tolerated: the data cannot be used", name),
           fmt::format("correct the data; kinds that can be tolerated are {}", tolerable_kinds()));
     } else if (!kind->tolerable) {
-      add(Severity::note, "tolerate", "", 0, "", fmt::format("\"{}\" is never an error", name),
+      add(Severity::note, "tolerate", file, line, "", fmt::format("\"{}\" is never an error", name),
           fmt::format("kinds that can be tolerated are {}", tolerable_kinds()));
     }
   }
 }
 
 bool Findings::tolerates(std::string_view kind) const {
-  return std::find(tolerate_.begin(), tolerate_.end(), kind) != tolerate_.end();
+  const auto has = [&](const std::vector<std::string>& kinds) {
+    return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+  };
+  return has(tolerate_) || has(tolerate_also_);
 }
 
 Severity Findings::add(Finding finding) {

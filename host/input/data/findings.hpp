@@ -29,6 +29,11 @@ class Findings {
   explicit Findings(std::vector<std::string> tolerate = {});
 
   bool tolerates(std::string_view kind) const;
+  // Adds an error of kind "tolerate" for each kind that does not exist or cannot be tolerated. `file` and `line`: where
+  // they are stated.
+  void check_kinds(const std::vector<std::string>& kinds, const std::string& file = {}, std::size_t line = 0);
+  // The kinds that the dataset.toml of what is read from now on tolerates besides, instead of those of the one before.
+  void tolerate_also(std::vector<std::string> kinds) { tolerate_also_ = std::move(kinds); }
   // An error of a tolerated kind is kept as a warning. Returns the severity it was kept with.
   Severity add(Finding finding);
   Severity add(Severity severity, std::string kind, std::string file, std::size_t line, std::string column,
@@ -43,7 +48,7 @@ class Findings {
   const std::vector<Finding>& list() const { return list_; }
 
  private:
-  std::vector<std::string> tolerate_;
+  std::vector<std::string> tolerate_, tolerate_also_;
   std::vector<Finding> list_;
 };
 

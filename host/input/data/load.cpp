@@ -58,8 +58,10 @@ class Loader {
     cached_.reset();  // a file's numbers take as much memory as the experiments
     DriveFacts facts = data_.drive;
     if (!facts.axis) facts.axis = options_.axis;
-    for (Experiment& experiment : data_.experiments) {
+    for (std::size_t i = 0; i < data_.experiments.size(); ++i) {
+      Experiment& experiment = data_.experiments[i];
       if (options_.holdout) experiment.role = Role::holdout;
+      findings_.tolerate_also(tolerated_[i]);
       check_experiment(experiment, facts, findings_);
     }
     check_replicates();
@@ -160,6 +162,8 @@ class Loader {
   }
 
   void read_file(const fs::path& path, const DatasetToml* toml, const ExperimentEntry* entry) {
+    const std::vector<std::string> tolerated = toml != nullptr ? toml->tolerate : std::vector<std::string>{};
+    findings_.tolerate_also(tolerated);
     TimeBounds bounds;
     if (entry != nullptr) bounds = {entry->from_s, entry->to_s};
     const std::optional<std::size_t> element = entry != nullptr ? entry->element : std::nullopt;
@@ -195,8 +199,10 @@ class Loader {
 
     read_without_axis_ = read_without_axis_ || !data_.drive.axis;
     if (read_experiment(file->table, file->plan, bounds, data_.drive.axis.value_or(assumed_axis()), experiment,
-                        findings_))
+                        findings_)) {
       data_.experiments.push_back(std::move(experiment));
+      tolerated_.push_back(tolerated);
+    }
   }
 
   void make_unique(Experiment& experiment) {
@@ -221,7 +227,8 @@ class Loader {
   const LoadOptions& options_;
   Findings findings_;
   Dataset data_;
-  bool read_without_axis_ = false;  // an experiment, by the one that is assumed
+  std::vector<std::vector<std::string>> tolerated_;  // of each experiment, by its dataset.toml
+  bool read_without_axis_ = false;                   // an experiment, by the one that is assumed
   std::string cached_key_;
   std::unique_ptr<Source> cached_;
   std::set<std::string> seen_;

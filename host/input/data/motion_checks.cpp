@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host/input/data/checks.hpp"
+#include "host/input/data/record_time.hpp"
 
 namespace flexspline::data {
 namespace {
@@ -274,8 +275,8 @@ void check_wrapped_positions(Experiment& experiment, Axis axis, Findings& findin
             : "";
     const Severity severity =
         findings.add(Severity::error, "wrapped_position", experiment.file.string(), 0, std::string(column_name(column)),
-                     fmt::format("in \"{}\" it jumps by a turn {} times, first at {:.6g} s{}", experiment.name,
-                                 wraps.size(), experiment.time_s[wraps.front().sample + 1], ambiguous),
+                     fmt::format("in \"{}\" it jumps by a turn {} times, first at {}{}", experiment.name, wraps.size(),
+                                 time_text(experiment, experiment.time_s[wraps.front().sample + 1]), ambiguous),
                      findings.tolerates("wrapped_position")
                          ? "the turns were added"
                          : "log the position without wrapping, or --tolerate wrapped_position to have the turns added");
@@ -340,9 +341,10 @@ void mask_rest(Experiment& experiment, Column column, const std::vector<Segment>
                 experiment.masked.begin() + static_cast<std::ptrdiff_t>(s.last), std::uint8_t{1});
   findings.add(mask ? Severity::warning : Severity::note, "standstill", experiment.file.string(), 0,
                std::string(column_name(column)),
-               fmt::format("\"{}\" is at rest for {:.0f} % of its samples, first from {:.6g} s to {:.6g} s{}",
-                           experiment.name, 100.0 * share, experiment.time_s[intervals.front().first],
-                           experiment.time_s[intervals.front().last - 1], mask ? "; those samples are masked" : ""),
+               fmt::format("\"{}\" is at rest for {:.0f} % of its samples, first {}{}", experiment.name, 100.0 * share,
+                           times_text(experiment, experiment.time_s[intervals.front().first],
+                                      experiment.time_s[intervals.front().last - 1]),
+                           mask ? "; those samples are masked" : ""),
                "nothing needs doing if the rest moves enough");
 }
 

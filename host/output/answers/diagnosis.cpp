@@ -6,6 +6,8 @@
 #include <cmath>
 #include <span>
 
+#include "host/engine/selection/wald_test.hpp"
+#include "host/output/answers/disturbance_text.hpp"
 #include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/explanation.hpp"
 #include "host/output/answers/identification.hpp"
@@ -23,6 +25,11 @@ using selection::Verdict;
 constexpr std::size_t kRowsShown = 10;
 // Errors that differ by less are reported as equal.
 constexpr double kRunFrictionMatters = 0.95;
+
+// The squared error that a term takes off may be more than what is above the noise, which is an estimate.
+double clipped(double share_percent) {
+  return std::clamp(share_percent, 0.0, 100.0);
+}
 
 // A share above zero is not called 0 %.
 std::string percent(double share) {
@@ -64,7 +71,7 @@ std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   return listed(texts);
 }
 
-std::string candidate_table(const Diagnosis& d) {
+std::string candidate_table(const Diagnosis& d, const model::Drive* drive) {
   Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "smallest detectable", ""},
               "rllrrrrlll");
   std::size_t rank = 0;
@@ -72,7 +79,8 @@ std::string candidate_table(const Diagnosis& d) {
     if (++rank > kRowsShown) break;
     table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), catalogue::balance_name(c.balance),
                number(c.score), fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before),
-               number(c.rmse_cv_after), d.unit, detectable_in_words(c), c.admissible ? "" : "refused: " + c.why_not});
+               number(c.rmse_cv_after), d.unit, detectable_in_words(c, drive),
+               c.admissible ? "" : "refused: " + c.why_not});
   }
   return table.text();
 }
@@ -254,8 +262,8 @@ void print_resampling(Console& console, const selection::Resampling& r) {
     for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
     found.push_back(fmt::format("{} in {:.0f} of 100 ({} % of the squared error above the noise, {:.0f} to {:.0f} %)",
                                 names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"),
-                                100.0 * f.frequency, percent(f.share_percent), f.share_low_percent,
-                                f.share_high_percent));
+                                100.0 * f.frequency, percent(clipped(f.share_percent)), clipped(f.share_low_percent),
+                                clipped(f.share_high_percent)));
   }
   const std::string how =
       fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
@@ -271,15 +279,23 @@ std::string words(const std::vector<selection::NamedEffect>& group) {
   return listed(names, "or");
 }
 
+// What to record where an effect is neither shown nor ruled out.
+std::string what_decides(const Diagnosis& d, const selection::NamedEffect& effect) {
+  if (const Candidate* c = candidate_of(d, effect); c && selection::has_unresolved_travel(*c))
+    return "slower reversals, or the same at a higher sample rate or with a finer encoder";
+  const catalogue::Entry* entry = catalogue::find(effect.effect);
+  return entry ? std::string(entry->info->separated_by) : "";
+}
+
 // What these data neither show nor rule out, and what to record.
-void print_possible(Console& console, const std::vector<selection::PossibleEffect>& possible, data::Axis axis) {
-  for (const selection::PossibleEffect& one : possible) {
+void print_possible(Console& console, const Diagnosis& d) {
+  for (const selection::PossibleEffect& one : d.possible) {
     std::string text = fmt::format("These data do not decide whether {} is missing", words(one.group));
     if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
     text += fmt::format("; {}.", one.why_not);
-    if (const catalogue::Entry* entry = catalogue::find(one.group.front().effect))
-      text += fmt::format(" To decide, record: {}.", entry->info->separated_by);
-    console.line(wrapped(words_on(axis, text)));
+    if (const std::string record = what_decides(d, one.group.front()); !record.empty())
+      text += fmt::format(" To decide, record: {}.", record);
+    console.line(wrapped(words_on(axis_of(d.unit), text)));
   }
 }
 
@@ -295,15 +311,37 @@ void print_confounded_with_model(Console& console, const Diagnosis& d) {
   }
 }
 
-void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command, const model::Drive* drive) {
+// How large the named effects are.
+void print_sizes(Console& console, const Diagnosis& d) {
+  std::string sizes;
+  for (const selection::NamedEffect& named : d.named)
+    if (const Candidate* c = candidate_of(d, named); c && c->size)
+      sizes += fmt::format("{}{}", sizes.empty() ? "" : "; ", size_in_words(*c, d.unit));
+  if (!sizes.empty()) console.line(wrapped(words_on(axis_of(d.unit), sizes + ".")));
+}
+
+// A delay of a sample or more is a cause by itself, which is to be removed first. It is stated where it is significant.
+bool is_delay_first(const Diagnosis& d, const data::Dataset* dataset) {
+  if (!d.delay_s || d.delay_advice.empty() || !dataset) return false;
+  double longest_s = 0.0;
+  for (const data::Experiment& e : dataset->experiments) longest_s = std::max(longest_s, e.sample_s);
+  return longest_s > 0.0 && std::abs(*d.delay_s) >= longest_s;
+}
+
+void print_diagnosis(Console& console, const Diagnosis& d, const std::string& add_command, const model::Drive* drive,
+                     const data::Dataset* dataset) {
   const data::Axis axis = axis_of(d.unit);
   console.line(console.bold(wrapped(verdict_in_words(d), 0)));
+  const std::string delay = d.delay_advice.empty() ? "" : wrapped(words_on(axis, d.delay_advice));
+  const bool delay_first = is_delay_first(d, dataset);
+  if (delay_first) console.line(delay);
+  print_sizes(console, d);
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
-  print_possible(console, d.possible, axis);
+  print_possible(console, d);
   if (!d.localised.empty())
     console.line(wrapped(words_on(axis, fmt::format("The error depends on {}.", shares(d.localised)))));
-  if (!d.delay_advice.empty()) console.line(wrapped(words_on(axis, d.delay_advice)));
+  if (!delay.empty() && !delay_first) console.line(delay);
   if (!d.untried_advice.empty()) console.line(wrapped(words_on(axis, d.untried_advice)));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit, drive);
@@ -313,7 +351,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (d.unknown) print_unknown(console, d);
   if (!d.candidates.empty()) {
     console.line();
-    console.line(candidate_table(d));
+    console.line(candidate_table(d, drive));
     print_confounded_with_model(console, d);
   }
   for (const selection::Trend& t : d.parameter_trends)
@@ -324,14 +362,7 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
     console.line(wrapped(fmt::format("With {}, the error still depends on {}.",
                                      d.between_records ? "friction that is each record's own" : "that added",
                                      shares(d.remaining_structure))));
-  if (!d.disturbances.empty()) {
-    Table table({"disturbance in", "from", "to", "peak"}, "lrrr");
-    for (const selection::Disturbance& x : d.disturbances)
-      table.row({x.experiment, fmt::format("{:.3f} s", x.from_s), fmt::format("{:.3f} s", x.to_s),
-                 with_unit(x.peak, x.unit)});
-    console.line();
-    console.line(table.text());
-  }
+  print_disturbances(console, d.disturbances, dataset);
   print_next(console, d, add_command);
 }
 

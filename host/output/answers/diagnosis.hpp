@@ -21,9 +21,9 @@ std::string verdict_in_words(const selection::Diagnosis& found);
 
 // Verdict, evidence, candidates, effects that cannot be distinguished, with the experiment that separates them, where
 // the error is, what to do next. `add_command`: what to type to add the named effect, with EFFECT where its name
-// goes. `drive`, of the model, where it is known.
+// goes. `drive`, of the model, and `dataset`, where they are known.
 void print_diagnosis(Console& console, const selection::Diagnosis& found, const std::string& add_command,
-                     const model::Drive* drive = nullptr);
+                     const model::Drive* drive = nullptr, const data::Dataset* dataset = nullptr);
 
 // "flexspline-diagnose/1". With more than one round, `named` is `kept`: all that were added and not removed since.
 nlohmann::json diagnosis_json(const selection::Diagnosis& found);

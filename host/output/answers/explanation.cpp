@@ -74,7 +74,52 @@ void print_order_causes(Console& console, const Candidate& c) {
   if (!c.order_hint.empty()) console.line(wrapped(c.order_hint));
 }
 
+// "0.0121 N*m (RMS)"
+std::string rms_in_words(const selection::EffectSize& size, const std::string& unit) {
+  return fmt::format("{} {} (RMS)", number(size.rms), unit);
+}
+
+// "; 0.16 % of the rated torque"; empty where that is not stated.
+std::string share_of_rated(const selection::EffectSize& size, std::string_view joint) {
+  if (!size.percent_of_rated) return "";
+  return fmt::format("{}{} % of the rated torque", joint, number(*size.percent_of_rated, 2));
+}
+
+// The rated torque on the balance of a candidate; nothing where it is not stated.
+std::optional<double> rated_torque(const Candidate& c, const model::Drive* drive) {
+  if (!drive || !drive->rated_torque_nm.value || !(*drive->rated_torque_nm.value > 0.0)) return std::nullopt;
+  const double gear = c.balance == estimation::Balance::motor ? drive->gear_ratio.value.value_or(1.0) : 1.0;
+  return *drive->rated_torque_nm.value / gear;
+}
+
+// Whether no such drive has an effect of the smallest detectable size: a torque above the rated one, at the rated
+// velocity where it is proportional to that; else a value above its bound, or far above the usual one.
+bool is_beyond_drive(const Candidate& c, const model::Drive* drive) {
+  constexpr double kFarAboveUsual = 100.0;
+  const estimation::Estimate& size = c.minimum_detectable->size;
+  const double value = std::abs(size.value);
+  const std::optional<double> rated = rated_torque(c, drive);
+  if (rated && (size.unit == "N*m" || size.unit == "N")) return value > *rated;
+  if (rated && size.unit == "N*m*s/rad" && c.balance == estimation::Balance::motor && drive->rated_velocity_rad_s.value)
+    return value * *drive->rated_velocity_rad_s.value > *rated;
+  const catalogue::Entry* entry = catalogue::find(c.effect);
+  if (entry == nullptr) return false;
+  // The size of a wave has the bounds of its parts.
+  const std::string_view name = size.parameter == "amplitude" ? "cosine" : std::string_view(size.parameter);
+  const auto info = std::ranges::find(entry->parameters, name, &effects::ParameterInfo::name);
+  if (info == entry->parameters.end()) return false;
+  return value > info->high || (info->usual != 0.0 && value > kFarAboveUsual * std::abs(info->usual));
+}
+
 }  // namespace
+
+std::string size_in_words(const Candidate& c, const std::string& unit) {
+  constexpr double kSmallPercent = 0.5;
+  if (!c.size) return "";
+  return fmt::format("{}: {}{}{}", effect_in_words(c.effect, c.order), rms_in_words(*c.size, unit),
+                     share_of_rated(*c.size, ", "),
+                     c.size->percent_of_rated && *c.size->percent_of_rated < kSmallPercent ? ", small" : "");
+}
 
 void print_explanation(Console& console, const Candidate& c, const std::string& unit, const model::Drive* drive) {
   const catalogue::Entry* entry = catalogue::find(c.effect);
@@ -94,11 +139,8 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
     console.line(fmt::format("  {}", reference));
   if (c.size)
     console.line(wrapped(words_on(
-        axis_of(unit), fmt::format("Its torque that the model cannot replace: {} {} (RMS), {} at most{}.",
-                                   number(c.size->rms), unit, number(c.size->peak),
-                                   c.size->percent_of_rated
-                                       ? fmt::format("; {} % of the rated torque", number(*c.size->percent_of_rated, 2))
-                                       : ""))));
+        axis_of(unit), fmt::format("Its torque that the model cannot replace: {}, {} at most{}.",
+                                   rms_in_words(*c.size, unit), number(c.size->peak), share_of_rated(*c.size, "; ")))));
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);
@@ -108,8 +150,9 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
   print_confounding(console, c, info.separated_by, unit);
 }
 
-std::string detectable_in_words(const Candidate& c) {
+std::string detectable_in_words(const Candidate& c, const model::Drive* drive) {
   if (!c.minimum_detectable) return "";
+  if (!c.minimum_detectable->at_most && is_beyond_drive(c, drive)) return "not visible in these data";
   const estimation::Estimate& e = c.minimum_detectable->size;
   return fmt::format("{}{} {}", c.minimum_detectable->at_most ? "below " : "", e.parameter,
                      with_unit(std::stod(number(e.value, 2)), e.unit));

@@ -13,8 +13,12 @@ namespace flexspline::output {
 void print_explanation(Console& console, const selection::Candidate& candidate, const std::string& unit,
                        const model::Drive* drive = nullptr);
 
-// "coefficient 8.2e-4"; empty where there is none.
-std::string detectable_in_words(const selection::Candidate& candidate);
+// "torque_ripple (2 per turn): 0.00077 N*m (RMS), 0.16 % of the rated torque, small"; empty where the effect has no
+// size.
+std::string size_in_words(const selection::Candidate& candidate, const std::string& unit);
+
+// "coefficient 8.2e-4"; empty where there is none. A size that no such drive has is not visible in these data.
+std::string detectable_in_words(const selection::Candidate& candidate, const model::Drive* drive = nullptr);
 
 // P with "at_most" and "at", a list of P; null where there is none.
 nlohmann::json detectable_json(const selection::Candidate& candidate);

@@ -9,6 +9,7 @@
 
 #include "host/common/text/build_identity.hpp"
 #include "host/engine/comparison/compare.hpp"
+#include "host/input/data/record_time.hpp"
 #include "host/output/answers/comparison.hpp"
 #include "host/output/answers/diagnosis.hpp"
 #include "host/output/answers/identification.hpp"
@@ -38,13 +39,17 @@ json comparison_json(const comparison::Comparison& comparison) {
   return answer;
 }
 
-// Equations of the candidates, for the page alone.
-json diagnosis_json(const selection::Diagnosis& found) {
+// For the page alone: equations of the candidates, and times as its plots have them.
+json diagnosis_json(const selection::Diagnosis& found, const data::Dataset& dataset) {
   json answer = output::diagnosis_json(found);
   answer["verdict_in_words"] = output::verdict_in_words(found);
   for (json& candidate : answer["candidates"]) {
     const catalogue::Entry* entry = catalogue::find(candidate["effect"].get<std::string>());
     candidate["equation"] = entry ? json(entry->info->equation) : json(nullptr);
+  }
+  for (json& disturbance : answer["disturbances"]) {
+    const double start_s = data::start_of_times(dataset, disturbance["experiment"].get<std::string>());
+    for (const char* key : {"from_s", "to_s"}) disturbance[key] = disturbance[key].get<double>() - start_s;
   }
   return answer;
 }
@@ -59,7 +64,7 @@ json document(const Subject& subject) {
   std::vector<std::string> effects;
   for (const model::Effect& effect : subject.model.effects) effects.push_back(effect.id);
   json rounds = json::array();
-  for (const selection::Diagnosis& round : subject.rounds) rounds.push_back(diagnosis_json(round));
+  for (const selection::Diagnosis& round : subject.rounds) rounds.push_back(diagnosis_json(round, *subject.dataset));
   const std::time_t now = std::time(nullptr);
   json answer{{"format", "flexspline-report/1"},
               {"title", title_of(subject)},

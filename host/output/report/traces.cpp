@@ -4,6 +4,7 @@
 
 #include "host/engine/comparison/free_run.hpp"
 #include "host/engine/comparison/full_rate.hpp"
+#include "host/input/data/record_time.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/report/parts.hpp"
 #include "host/output/report/trace.hpp"
@@ -29,6 +30,13 @@ bool differs(const std::vector<double>& a, const std::vector<double>& b) {
   return difference > 1e-6 * size;
 }
 
+// As messages have them.
+std::vector<double> times_of(const data::Experiment& experiment, const Thinning& thinning) {
+  std::vector<double> times = thinning.times(experiment.time_s);
+  for (double& t : times) t -= data::start_of_times(experiment);
+  return times;
+}
+
 json balance_trace(const View& view, const BalanceView& balance, std::size_t record_at, std::size_t points) {
   const estimation::Record& record = view.prepared.records[record_at];
   const auto full = comparison::full_rate(view.prepared, record, balance.data->balance(), view.terms);
@@ -38,7 +46,7 @@ json balance_trace(const View& view, const BalanceView& balance, std::size_t rec
   for (std::size_t k = 0; k < modelled.size(); ++k) modelled[k] = full->target[k] - full->residual[k];
   json trace{{"signal", balance.signal},
              {"unit", balance.unit},
-             {"time", packed(thinning.times(record.experiment->time_s))},
+             {"time", packed(times_of(*record.experiment, thinning))},
              {"measured", packed(thinning.values(full->target))},
              {"model", packed(thinning.values(modelled))},
              {"residual", packed(thinning.values(full->residual, full->valid))},
@@ -66,7 +74,7 @@ json free_run_traces(const View& view, std::size_t record_at, std::size_t points
     if (!view.result(record_at, signal.name)) continue;
     traces.push_back({{"signal", signal.name},
                       {"unit", view.unit_of(signal.column)},
-                      {"time", packed(thinning.times(e.time_s))},
+                      {"time", packed(times_of(e, thinning))},
                       {"measured", packed(thinning.values(signal.measured))},
                       {"model", packed(thinning.values(signal.simulated))}});
   }
