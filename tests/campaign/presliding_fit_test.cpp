@@ -17,8 +17,8 @@ using data::Column;
 
 constexpr double kTravel = 0.9, kFriction = 0.05;  // rad, N m
 
-// An axis that swings to and fro.
-data::Dataset axis() {
+// An axis that swings to and fro by so many rad, with a presliding of this travel.
+data::Dataset axis(double amplitude_rad = 8.0, double travel_rad = kTravel) {
   data::Dataset dataset;
   std::mt19937_64 random(4);
   std::normal_distribution<double> noise(0.0, 5e-4);
@@ -26,9 +26,10 @@ data::Dataset axis() {
     double state = -1.0;
     dataset.experiments.push_back(
         tests::written_experiment(std::to_string(hz), 2e-3, 6000, [&](double t, data::Experiment& e) {
-          const double rate = kTurn * hz, q = -8.0 * std::cos(rate * t), w = 8.0 * rate * std::sin(rate * t);
+          const double rate = kTurn * hz, q = -amplitude_rad * std::cos(rate * t),
+                       w = amplitude_rad * rate * std::sin(rate * t);
           const double end = w > 0.0 ? 1.0 : -1.0;
-          state = end + (state - end) * std::exp(-2e-3 * std::abs(w) / kTravel);
+          state = end + (state - end) * std::exp(-2e-3 * std::abs(w) / travel_rad);
           e[Column::motor_position].push_back(q);
           e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 1e-3 * w + kFriction * state + noise(random));
         }));
@@ -53,6 +54,18 @@ TEST(PreslidingFit, HasTheTravelAndTheFrictionOfAllSamplesAndTheErrorsThatItTake
   EXPECT_LT(law->rmse_cv_after, 0.3 * law->rmse_cv_before);
   EXPECT_GT(law->chi2_decrease_percent, 90.0);
   ASSERT_TRUE(law->evidence.has_value());
+}
+
+TEST(PreslidingFit, WhoseTravelIsShorterThanTheMotionBetweenTwoSamplesIsNeitherNamedNorTheVerdictOfAMissingEffect) {
+  const Diagnosis found = diagnose(axis(100.0, 0.05), tests::plain_model(), {});
+  EXPECT_TRUE(found.named.empty());
+  EXPECT_NE(found.verdict, Verdict::missing_effect);
+  EXPECT_FALSE(found.recovered_percent);
+  const auto law = std::ranges::find(found.candidates, "dahl_friction", &Candidate::effect);
+  ASSERT_NE(law, found.candidates.end());
+  EXPECT_NE(law->note.find("around reversals"), std::string::npos) << "it was named until it was fitted with them";
+  ASSERT_EQ(found.possible.size(), 1U);
+  EXPECT_EQ(found.possible.front().group.front().effect, "dahl_friction");
 }
 
 }  // namespace

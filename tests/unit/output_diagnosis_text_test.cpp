@@ -122,10 +122,12 @@ TEST(DiagnosisText, HasADelayOfASampleOrMoreDirectlyBelowTheVerdict) {
 TEST(DiagnosisText, CallsAnEffectNotVisibleThatWouldHaveToBeLargerThanTheDriveCanBear) {
   model::Drive drive;
   drive.rated_torque_nm.value = 10.0;
+  drive.gear_ratio.value = 50.0;
+  drive.rated_velocity_rad_s.value = 200.0;
   const auto said = [&](const char* effect, const char* parameter, double value, const char* unit) {
     Candidate c;
     c.effect = effect;
-    c.balance = estimation::Balance::load;
+    c.balance = estimation::Balance::motor;
     c.minimum_detectable.emplace();
     c.minimum_detectable->size.parameter = parameter;
     c.minimum_detectable->size.value = value;
@@ -135,7 +137,10 @@ TEST(DiagnosisText, CallsAnEffectNotVisibleThatWouldHaveToBeLargerThanTheDriveCa
   };
   constexpr const char* kNotVisible = "not visible in these data";
   EXPECT_EQ(said("torque_ripple", "amplitude", 2200.0, "N*m"), kNotVisible);
-  EXPECT_EQ(said("torque_ripple", "amplitude", 0.22, "N*m"), "amplitude 0.22 N*m");
+  EXPECT_EQ(said("torque_ripple", "amplitude", 0.022, "N*m"), "amplitude 0.022 N*m");
+  EXPECT_EQ(said("torque_ripple", "amplitude", 0.22, "N*m"), kNotVisible) << "rated is 0.2 N*m at the motor";
+  EXPECT_EQ(said("gravity", "amplitude", 0.22, "N*m"), "amplitude 0.22 N*m") << "of the output";
+  EXPECT_EQ(said("viscous_friction", "coefficient", 0.0011, "N*m*s/rad"), kNotVisible);
   EXPECT_EQ(said("output_inertia", "inertia", 690.0, "kg*m^2"), kNotVisible);
   EXPECT_EQ(said("output_inertia", "inertia", 0.069, "kg*m^2"), "inertia 0.069 kg*m^2");
 }

@@ -85,11 +85,16 @@ std::string share_of_rated(const selection::EffectSize& size, std::string_view j
   return fmt::format("{}{} % of the rated torque", joint, number(*size.percent_of_rated, 2));
 }
 
-// The rated torque on the balance of a candidate; nothing where it is not stated.
+// On which side of the gear the values of an effect are, whichever balance shows it.
+bool is_of_motor(const Candidate& c) {
+  const catalogue::Entry* entry = catalogue::find(c.effect);
+  return (entry ? entry->info->balance : c.balance) == estimation::Balance::motor;
+}
+
+// The rated torque on that side; nothing where it is not stated.
 std::optional<double> rated_torque(const Candidate& c, const model::Drive* drive) {
   if (!drive || !drive->rated_torque_nm.value || !(*drive->rated_torque_nm.value > 0.0)) return std::nullopt;
-  const double gear = c.balance == estimation::Balance::motor ? drive->gear_ratio.value.value_or(1.0) : 1.0;
-  return *drive->rated_torque_nm.value / gear;
+  return *drive->rated_torque_nm.value / (is_of_motor(c) ? drive->gear_ratio.value.value_or(1.0) : 1.0);
 }
 
 // Whether no such drive has an effect of the smallest detectable size: a torque above the rated one, at the rated
@@ -100,7 +105,7 @@ bool is_beyond_drive(const Candidate& c, const model::Drive* drive) {
   const double value = std::abs(size.value);
   const std::optional<double> rated = rated_torque(c, drive);
   if (rated && (size.unit == "N*m" || size.unit == "N")) return value > *rated;
-  if (rated && size.unit == "N*m*s/rad" && c.balance == estimation::Balance::motor && drive->rated_velocity_rad_s.value)
+  if (rated && size.unit == "N*m*s/rad" && is_of_motor(c) && drive->rated_velocity_rad_s.value)
     return value * *drive->rated_velocity_rad_s.value > *rated;
   const catalogue::Entry* entry = catalogue::find(c.effect);
   if (entry == nullptr) return false;
