@@ -69,7 +69,9 @@ std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
            "each "
            "reversal";
   if (is_confirmed_by_held_out(result, name)) return {};
-  if (const std::optional<std::string> shape = undetermined_shape(*candidate))
+  // Likelihood names no law whose nonlinear parameter is at an end of its range; halves do not ask.
+  const bool halves_decide = result.resampling && result.resampling->decides;
+  if (const std::optional<std::string> shape = undetermined_shape(*candidate); shape && halves_decide)
     return fmt::format("the interval of its {} is all that is possible", *shape);
   const std::optional<double> p = wald_p_value(*candidate);
   return p && *p > kPolicy.wald_p_value ? "its values do not differ from zero beyond their intervals" : "";
