@@ -424,7 +424,8 @@ void add_delayed_waves(TableBuilder& builder, std::size_t first) {
     for (Eigen::Index j = 0; j < slopes.cols(); ++j)
       slopes.col(j) = slope_of(builder.columns[static_cast<std::size_t>(terms[w].columns[static_cast<std::size_t>(j)])],
                                builder.table.runs);
-    for (const Eigen::Index column : builder.add({std::move(slopes), {}})) {
+    const std::vector<Eigen::Index> places = builder.add({std::move(slopes), {}});
+    for (const Eigen::Index column : places) {
       delayed.columns.push_back(column);
       delayed.low.push_back(-effects::kUnbounded);
       delayed.high.push_back(effects::kUnbounded);
