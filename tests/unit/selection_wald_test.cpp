@@ -106,6 +106,26 @@ TEST(WaldTest, PreslidingOfAResolvedTravelStays) {
   EXPECT_EQ(result.named.size(), 1u);
 }
 
+TEST(WaldTest, ALawWhoseShapeMayBeAnythingIsTakenBackWhereHalvesOfTheDataChoseIt) {
+  const auto names_left = [](double low, double high, bool halves_decide) {
+    Candidate law;
+    law.effect = "power_law_friction";
+    estimation::Estimate& exponent = law.parameters.emplace_back();
+    exponent.ref.parameter = catalogue::get(law.effect).index_of("exponent");
+    exponent.value = 0.3;
+    exponent.low = low;
+    exponent.high = high;
+    Diagnosis result = with(law);
+    result.resampling.emplace();
+    result.resampling->decides = halves_decide;
+    take_back_insignificant(result);
+    return result.named.size();
+  };
+  EXPECT_EQ(names_left(0.15, 0.85, true), 0U);
+  EXPECT_EQ(names_left(0.15, 0.6, true), 1U);
+  EXPECT_EQ(names_left(0.15, 0.85, false), 1U);
+}
+
 TEST(WaldTest, ASignificantNameStays) {
   Diagnosis result = with(candidate({1.0, -5.0}));
   take_back_insignificant(result);
