@@ -25,19 +25,16 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 // What an axis that swings over `turns` of its output is said to lack, when `dry(output angle, t)` is what its dry
 // friction has besides a constant, N m.
 std::string named(double turns, std::uint64_t seed, const std::function<double(double, double)>& dry) {
-  data::Dataset dataset;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
-  for (const double rate : {0.2, 0.3, 0.5})
-    dataset.experiments.push_back(
-        tests::written_experiment(fmt::format("{:g}", rate), 8e-3, 7500, [&](double t, data::Experiment& e) {
-          const double amplitude = 0.5 * turns * kTurn * kRatio, q = amplitude * std::sin(rate * t),
-                       w = amplitude * rate * std::cos(rate * t);
-          e[Column::motor_position].push_back(q);
-          e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 3e-4 * w +
-                                            (0.02 + dry(q / kRatio, t)) * (w > 0.0 ? 1.0 : -1.0) +
-                                            1e-3 * noise(random));
-        }));
+  const data::Dataset dataset =
+      tests::written_dataset({0.2, 0.3, 0.5}, 8e-3, 7500, [&](double rate, double t, data::Experiment& e) {
+        const double amplitude = 0.5 * turns * kTurn * kRatio, q = amplitude * std::sin(rate * t),
+                     w = amplitude * rate * std::cos(rate * t);
+        e[Column::motor_position].push_back(q);
+        e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 3e-4 * w +
+                                          (0.02 + dry(q / kRatio, t)) * (w > 0.0 ? 1.0 : -1.0) + 1e-3 * noise(random));
+      });
   model::Model model = tests::plain_model();
   model.drive.gear_ratio.value = kRatio;
   const Diagnosis d = diagnose(dataset, model, {});

@@ -17,23 +17,19 @@ using data::Column;
 
 // An axis with a Gaussian Stribeck law of that velocity, rad/s, that stands still between its strokes.
 data::Dataset axis(double velocity) {
-  data::Dataset dataset;
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0.0, 5e-4);
-  for (const double speed : {80.0, 40.0, 10.0, 3.0})
-    dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(speed), 4e-3, 5000, [&](double t, data::Experiment& e) {
-          // Slow at the ends of each stroke: the integral is that of the third power of a sine.
-          const double x = 1.7 * t, c = std::cos(x), y = std::sin(x);
-          const double w = speed * y * y * y;
-          const double q = speed / 1.7 * (c * c * c / 3.0 - c);
-          const double acceleration = 5.1 * speed * y * y * c;
-          e[Column::motor_position].push_back(q);
-          e[Column::motor_torque].push_back(1e-4 * acceleration + 1e-3 * w +
-                                            std::copysign(0.05 + 0.02 * std::exp(-std::pow(w / velocity, 2)), w) +
-                                            noise(random));
-        }));
-  return dataset;
+  return tests::written_dataset({80.0, 40.0, 10.0, 3.0}, 4e-3, 5000, [&](double speed, double t, data::Experiment& e) {
+    // Slow at the ends of each stroke: the integral is that of the third power of a sine.
+    const double x = 1.7 * t, c = std::cos(x), y = std::sin(x);
+    const double w = speed * y * y * y;
+    const double q = speed / 1.7 * (c * c * c / 3.0 - c);
+    const double acceleration = 5.1 * speed * y * y * c;
+    e[Column::motor_position].push_back(q);
+    e[Column::motor_torque].push_back(1e-4 * acceleration + 1e-3 * w +
+                                      std::copysign(0.05 + 0.02 * std::exp(-std::pow(w / velocity, 2)), w) +
+                                      noise(random));
+  });
 }
 
 class GridOfHalves : public ::testing::TestWithParam<double> {};

@@ -1,7 +1,8 @@
-// A record whose signals are written down in a test.
+// Records whose signals are written down in a test.
 #pragma once
 
 #include <cstddef>
+#include <initializer_list>
 #include <string>
 #include <utility>
 
@@ -23,6 +24,16 @@ data::Experiment written_experiment(std::string name, double sample_s, std::size
   }
   e.segments = {{0, e.size()}};
   return e;
+}
+
+// One such record for each value, which is its name, too. `fill(value, t, e)`.
+template <class Fill>
+data::Dataset written_dataset(std::initializer_list<double> values, double sample_s, std::size_t samples, Fill fill) {
+  data::Dataset dataset;
+  for (const double value : values)
+    dataset.experiments.push_back(written_experiment(std::to_string(value), sample_s, samples,
+                                                     [&](double t, data::Experiment& e) { fill(value, t, e); }));
+  return dataset;
 }
 
 }  // namespace flexspline::tests

@@ -19,16 +19,13 @@ using data::Column;
 
 // The regressor table of an axis with a ripple of order 2 that follows the angle by 5 ms.
 RegressorTable table_of_late_ripple() {
-  data::Dataset dataset;
-  for (const double rate : {0.5, 1.0})
-    dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(rate), 4e-3, 6000, [&](double t, data::Experiment& e) {
-          const double w = 20.0 * std::sin(rate * t), q = 20.0 / rate * (1.0 - std::cos(rate * t));
-          e[Column::motor_position].push_back(q);
-          e[Column::motor_torque].push_back(2e-3 * rate * std::cos(rate * t) + 3e-4 * w +
-                                            0.02 * (w > 0.0 ? 1.0 : -1.0) +
-                                            0.01 * std::cos(2.0 * (q - 5e-3 * w) - 0.7));
-        }));
+  const data::Dataset dataset =
+      tests::written_dataset({0.5, 1.0}, 4e-3, 6000, [](double rate, double t, data::Experiment& e) {
+        const double w = 20.0 * std::sin(rate * t), q = 20.0 / rate * (1.0 - std::cos(rate * t));
+        e[Column::motor_position].push_back(q);
+        e[Column::motor_torque].push_back(2e-3 * rate * std::cos(rate * t) + 3e-4 * w + 0.02 * (w > 0.0 ? 1.0 : -1.0) +
+                                          0.01 * std::cos(2.0 * (q - 5e-3 * w) - 0.7));
+      });
   const auto fitted = estimation::identify(dataset, tests::plain_model(), {});
   const std::vector<const data::Experiment*> all = {&dataset.experiments[0], &dataset.experiments[1]};
   return make_tables(all, fitted->model.drive, fitted->terms, Balance::motor, kPolicy).table;

@@ -21,18 +21,15 @@ using data::Column;
 // The candidates `gravity` and `torque_ripple` of order 1 of an axis without a gear that moves `stroke_rad` to either
 // side, and on which 0.05 N m sin(waves * angle) acts.
 std::vector<CandidateFit> weight_and_ripple(double stroke_rad, double waves) {
-  data::Dataset dataset;
   std::mt19937_64 random(7);
   std::normal_distribution<double> noise(0.0, 1.0);
-  for (const double hz : {0.2, 0.3, 0.5})
-    dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(hz), 2e-3, 6000, [&](double t, data::Experiment& e) {
-          const double rate = kTurn * hz, q = stroke_rad * std::sin(rate * t),
-                       w = stroke_rad * rate * std::cos(rate * t);
-          e[Column::motor_position].push_back(q);
-          e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 1e-3 * w + 0.02 * (w > 0.0 ? 1.0 : -1.0) +
-                                            0.05 * std::sin(waves * q + 0.4) + 2e-3 * noise(random));
-        }));
+  const data::Dataset dataset =
+      tests::written_dataset({0.2, 0.3, 0.5}, 2e-3, 6000, [&](double hz, double t, data::Experiment& e) {
+        const double rate = kTurn * hz, q = stroke_rad * std::sin(rate * t), w = stroke_rad * rate * std::cos(rate * t);
+        e[Column::motor_position].push_back(q);
+        e[Column::motor_torque].push_back(-1e-4 * rate * rate * q + 1e-3 * w + 0.02 * (w > 0.0 ? 1.0 : -1.0) +
+                                          0.05 * std::sin(waves * q + 0.4) + 2e-3 * noise(random));
+      });
   model::Model model = tests::plain_model();
   model.drive.gear_ratio.value = 1.0;
   const auto identified = estimation::identify(dataset, model, {});

@@ -18,18 +18,16 @@ using data::Column;
 // the current times 0.05 N m/A. With the current itself: tests/campaign/strong_saturation_test.cpp.
 Diagnosis diagnosis_of_torque() {
   constexpr double kNmPerA = 0.05;
-  data::Dataset dataset;
   std::mt19937_64 random(9);
   std::normal_distribution<double> noise(0.0, 1e-3);
-  for (const double hz : {0.3, 0.5, 0.8, 1.0})
-    dataset.experiments.push_back(
-        tests::written_experiment(std::to_string(hz), 4e-3, 1500, [&](double t, data::Experiment& e) {
-          const double rate = kTurn * hz, q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t);
-          const double torque = -8e-4 * rate * rate * q + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0);
-          const double linear_a = torque / kNmPerA, current = linear_a + 3e-4 * std::pow(linear_a, 3) + noise(random);
-          e[Column::motor_position].push_back(q);
-          e[Column::motor_torque].push_back(kNmPerA * current);
-        }));
+  const data::Dataset dataset =
+      tests::written_dataset({0.3, 0.5, 0.8, 1.0}, 4e-3, 1500, [&](double hz, double t, data::Experiment& e) {
+        const double rate = kTurn * hz, q = 30.0 * std::sin(rate * t), w = 30.0 * rate * std::cos(rate * t);
+        const double torque = -8e-4 * rate * rate * q + 1e-3 * w + 0.05 * (w > 0.0 ? 1.0 : -1.0);
+        const double linear_a = torque / kNmPerA, current = linear_a + 3e-4 * std::pow(linear_a, 3) + noise(random);
+        e[Column::motor_position].push_back(q);
+        e[Column::motor_torque].push_back(kNmPerA * current);
+      });
   return diagnose(dataset, tests::plain_model(), {});
 }
 

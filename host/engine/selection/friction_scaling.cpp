@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/common/numbers/distributions.hpp"
@@ -212,13 +213,20 @@ const CandidateFit* likely_scaling(const SearchedBalance& motor) {
   return best;
 }
 
-// Puts the effect behind those that are named. Its candidate has its values.
-void name_it(const NamedEffect& name, const BetweenRecords& evidence, Diagnosis& result) {
-  const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
-    return c.effect == name.effect && c.balance == estimation::Balance::motor;
+using Candidates = std::vector<Candidate>;
+
+// On the motor's balance; the end of the list: it is not there.
+Candidates::iterator candidate_of_effect(std::string_view effect, Diagnosis& result) {
+  return std::ranges::find_if(result.candidates, [&](const Candidate& c) {
+    return c.effect == effect && c.balance == estimation::Balance::motor;
   });
+}
+
+// Puts an effect, whose candidate has its values, behind those that are named.
+void name_it(Candidates::iterator candidate, const BetweenRecords& evidence, Diagnosis& result) {
+  const NamedEffect name{candidate->effect, std::nullopt};
   std::erase_if(result.possible, [&](const PossibleEffect& p) { return p.group.front().effect == name.effect; });
-  std::rotate(result.candidates.begin() + std::ssize(result.named), at, at + 1);
+  std::rotate(result.candidates.begin() + std::ssize(result.named), candidate, candidate + 1);
   result.named.push_back(name);
   result.verdict = Verdict::missing_effect;
   result.balance = estimation::Balance::motor;
@@ -233,8 +241,7 @@ bool name_likely_scaling(const SearchedBalance& motor, Diagnosis& result) {
   const auto tried = static_cast<double>(
       std::ranges::count_if(motor.candidates, [](const CandidateFit& t) { return is_scaling(*t.model.entry); }));
   const double p_value = std::min(1.0, tried * p_value_of_likelihood(likely->gain.score, records));
-  const NamedEffect name{std::string(likely->model.entry->name()), std::nullopt};
-  const auto at = std::ranges::find_if(result.candidates, [&](const Candidate& c) { return c.effect == name.effect; });
+  const auto at = candidate_of_effect(likely->model.entry->name(), result);
   if (p_value > kPolicy.scaling_p_value || at == result.candidates.end()) return false;
   at->admit();
   at->p_value = p_value;
@@ -242,7 +249,7 @@ bool name_likely_scaling(const SearchedBalance& motor, Diagnosis& result) {
       "Found between records, by the likelihood of all {} (p = {:.2g}). What else changed from record to record, such "
       "as wear-in over time, would look the same: repeat one motion cold and warm to make sure.",
       records, p_value);
-  name_it(name, {records, likely->gain.fixed_effects_percent, p_value}, result);
+  name_it(at, {records, likely->gain.fixed_effects_percent, p_value}, result);
   return true;
 }
 
@@ -271,9 +278,7 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
   if (std::any_of(result.named.begin(), result.named.end(),
                   [&](const NamedEffect& n) { return n.effect == name.effect; }))
     return false;
-  const auto at = std::find_if(result.candidates.begin(), result.candidates.end(), [&](const Candidate& c) {
-    return c.effect == name.effect && c.balance == estimation::Balance::motor;
-  });
+  const auto at = candidate_of_effect(name.effect, result);
   if (at == result.candidates.end()) return false;
   const std::size_t records = own.records.size();
   if (p_value > kPolicy.scaling_p_value) {
@@ -282,7 +287,7 @@ bool name_scaling(const estimation::Identification& base, const SearchedBalance&
     return false;
   }
   take_value(*best, records, p_value, *at);
-  name_it(name, {records, 100.0 * best->fit.explained_share, p_value}, result);
+  name_it(at, {records, 100.0 * best->fit.explained_share, p_value}, result);
   return true;
 }
 
