@@ -70,11 +70,23 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
   EXPECT_EQ(diagnosis_json(d).at("base").at("noise_of_some").at("experiments"), nlohmann::json({"sine"}));
 }
 
+TEST(DiagnosisAnswer, DoesNotSayThatNothingIsMissingWhereSomethingIsPossible) {
+  selection::Diagnosis d;
+  d.verdict = selection::Verdict::at_noise_floor;
+  EXPECT_EQ(verdict_in_words(d), "Nothing is missing: the model's error is the noise of the measurement.");
+  d.possible = with_possible_effects().possible;
+  EXPECT_EQ(verdict_in_words(d).find("Nothing is missing"), std::string::npos);
+}
+
 TEST(DiagnosisAnswer, DoesNotSayThatTheNoiseIsUnknownWhereItIsKnown) {
   selection::Diagnosis d;
   d.verdict = selection::Verdict::nothing_significant;
-  EXPECT_NE(verdict_in_words(d).find("The noise level is not known"), std::string::npos);
+  d.base_rmse = 0.024;
+  d.effort_rms = 0.1;
+  EXPECT_NE(verdict_in_words(d).find("It leaves 24 % of the effort; how much of that is noise is not known."),
+            std::string::npos);
   d.noise_floor = 1e-3;
+  EXPECT_NE(verdict_in_words(d).find("Its error is 24 times the noise"), std::string::npos);
   EXPECT_EQ(verdict_in_words(d).find("not known"), std::string::npos);
   d.possible = with_possible_effects().possible;
   EXPECT_EQ(verdict_in_words(d).find("not known"), std::string::npos);

@@ -57,7 +57,7 @@ TEST(RecordInertia, ThatDiffersIsFoundWithItsRangeAndHowMuchItExplains) {
   EXPECT_NEAR(own->least, 1e-3, 2e-5);
   EXPECT_NEAR(own->most, 1.3e-3, 2e-5);
   EXPECT_GT(own->explains_percent, 80.0);
-  EXPECT_NE(inertia_text(*own).find("Was the load changed?"), std::string::npos);
+  EXPECT_NE(inertia_text(*own).find("Was the load changed, or the posture of other joints?"), std::string::npos);
 }
 
 TEST(RecordInertia, ThatIsOneIsNotSaidToDiffer) {

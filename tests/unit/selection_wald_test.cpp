@@ -100,6 +100,22 @@ TEST(WaldTest, PreslidingWhoseTravelMayBeZeroIsTakenBackThoughHeldOutExperiments
   EXPECT_NE(result.candidates.front().why_not.find("too short for these samples"), std::string::npos);
 }
 
+TEST(WaldTest, OfPreslidingWhatAllSamplesSayCountsInsteadOfTheInterval) {
+  Candidate law = presliding_of(0.03, 0.02);
+  law.presliding_doubt = "";
+  Diagnosis sure = with(law);
+  take_back_insignificant(sure);
+  EXPECT_EQ(sure.named.size(), 1u);
+  law = presliding_of(0.03, 0.001);
+  law.presliding_doubt = "the error does not fall";
+  Diagnosis doubtful = with(law);
+  take_back_insignificant(doubtful, false);  // not judged before all samples were asked
+  EXPECT_EQ(doubtful.named.size(), 1u);
+  take_back_insignificant(doubtful);
+  EXPECT_TRUE(doubtful.named.empty());
+  EXPECT_EQ(doubtful.candidates.front().why_not, "the error does not fall");
+}
+
 TEST(WaldTest, PreslidingOfAResolvedTravelStays) {
   Diagnosis result = with(presliding_of(0.03, 0.01));
   take_back_insignificant(result);

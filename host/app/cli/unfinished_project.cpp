@@ -98,6 +98,8 @@ std::vector<Missing> missing_of(const project::Draft& draft, const std::vector<C
 
 // A --map for each signal that a motor balance needs and that was not found.
 std::string missing_maps(const project::Draft& draft, const project::Request& request) {
+  // There the columns are mapped by the dataset.toml, with which no --map goes.
+  if (draft.from_toml) return {};
   std::vector<Candidate> left = candidates_of(draft, request);
   std::string line;
   for (const Missing& missing : missing_of(draft, left)) {

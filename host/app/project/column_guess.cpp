@@ -210,6 +210,7 @@ class Guesser {
       (c.ours.starts_with("motor") ? motor : link) = true;
       open = open || (guessed && readings_[c.theirs].side == Side::open);
     }
+    if (!motor && is_stated_link_with_gear()) return take_motor_of_link();
     const bool one_side = motor != link && (is_mapped_motion());
     if (!one_side) return;
     Side side = link ? Side::link : open ? Side::open : Side::motor;
@@ -221,6 +222,23 @@ class Guesser {
     if (ratio == 1.0 && is_native("output_position_rad")) return;
     set_motor_columns(ratio);
     result_.joint_side = ratio == 1.0;
+    result_.scaled_by = ratio;
+  }
+
+  bool is_stated_link_with_gear() const {
+    const bool is_native_link = is_native("output_position_rad") || is_native("output_velocity_rad_s");
+    return is_native_link && !is_mapped_motion() && options_.position_side == Side::link &&
+           options_.gear_ratio.value_or(1.0) != 1.0;
+  }
+  // The file's own columns of the output stay; the motor's are those times the gear ratio.
+  void take_motor_of_link() {
+    const double ratio = *options_.gear_ratio;
+    for (const auto& [ours, theirs] : {std::pair{"motor_position_rad", "output_position_rad"},
+                                       std::pair{"motor_velocity_rad_s", "output_velocity_rad_s"}})
+      if (is_native(theirs))
+        result_.columns.push_back(
+            {ours, theirs, "", fmt::format("\"{}\" times the gear ratio {:g}, as stated", theirs, ratio), ratio});
+    result_.side = Side::link;
     result_.scaled_by = ratio;
   }
 

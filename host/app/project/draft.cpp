@@ -273,8 +273,10 @@ void take_side(Draft& draft, const HeaderGuess& guess) {
     draft.notes.push_back(fmt::format(
         "\"{}\" counts electrical turns; give --pole-pairs P, or it is taken for the motor's", guess.needs_pole_pairs));
   if (guess.joint)
-    draft.notes.push_back(fmt::format("the file has the joints {}; joint {} was taken, --joint takes another",
-                                      fmt::join(guess.joints, ", "), *guess.joint));
+    draft.notes.push_back(
+        fmt::format("the file has the joints {}; joint {} was taken, --joint takes another. If others move, "
+                    "map what they do to this one as load_torque_nm, or record it alone",
+                    fmt::join(guess.joints, ", "), *guess.joint));
   if (guess.joint_side) {
     draft.toml.drive["gear_ratio"] = number_value(1.0);
     draft.gear_comment = "no motor sensors: the joint's columns are used as the motor's";

@@ -23,7 +23,8 @@ bool RegressorEvaluator::usable(const Record& r) const {
 
 namespace {
 
-// Left sides of a balance and their negative slopes along a record, for RegressorEvaluator::filtered_columns.
+// Left sides of a balance and negative slopes of what may come late in them, along a record, for
+// RegressorEvaluator::filtered_columns.
 class LeftHandSides {
  public:
   LeftHandSides(const PreparedData& prepared, Balance balance) : prepared_(prepared), balance_(balance) {}
@@ -57,6 +58,11 @@ class LeftHandSides {
       for (std::size_t k = 0; k < signal.size(); ++k)
         signal[k] -= r.load_torque[from + k] / prepared_.constants.gear_ratio;
   }
+  // What may come late: the motor's effort, and not the torque of the gear that is measured beside it.
+  void fill_late(const Record& r, std::size_t from, std::span<double> signal) const {
+    if (balance_ != Balance::motor) return fill_target(r, from, signal);
+    for (std::size_t k = 0; k < signal.size(); ++k) signal[k] = r.effort[from + k];
+  }
   void fill_delay(const Record& r, std::size_t from, std::span<double> signal) {
     const std::size_t end = from + signal.size();
     for (const data::Segment& s : r.segments) {
@@ -66,7 +72,7 @@ class LeftHandSides {
       const std::size_t before = std::min<std::size_t>(begin - s.first, 2);
       left_.resize(last - begin + before + std::min<std::size_t>(s.last - last, 2));
       slope_.resize(left_.size());
-      fill_target(r, begin - before, left_);
+      fill_late(r, begin - before, left_);
       signals::central_derivative(left_, r.sample_s, slope_);
       for (std::size_t k = begin; k < last; ++k) signal[k - from] = -slope_[k - begin + before];
     }

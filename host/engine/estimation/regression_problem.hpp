@@ -33,7 +33,8 @@ class RegressionProblem {
 
   // Measured left side, filtered, N m: Km i - T/N (motor; Km i without a torque sensor), T, T - load torque.
   const Eigen::VectorXd& target() const { return target_; }
-  // Negative slope of the target: what a delay of one second adds to it, to first order.
+  // What a delay of one second adds to the target, to first order: its negative slope; on the motor's balance that of
+  // the effort Km i alone, which comes late against motion and torque sensor.
   const Eigen::VectorXd& delay_column() const { return delay_; }
 
   // Torque per unit of a linear parameter, with nonlinear parameters, shifts and modulations as in `terms`, filtered. N

@@ -153,6 +153,22 @@ EffectName parse_effect(std::string_view text) {
   return name;
 }
 
+model::Model with_effect(const model::Model& model, const EffectName& name) {
+  const estimation::Terms terms = estimation::terms_of(model);
+  const estimation::Terms extended = extend(terms, *name.entry, name.order);  // checks that it may be added
+  model::Model after = model;
+  std::erase_if(after.effects, [&](const model::Effect& e) {
+    return std::none_of(extended.begin(), extended.end(), [&](const estimation::Term& t) { return t.id == e.id; });
+  });
+  model::Effect added = catalogue::blank_effect(*name.entry, model.drive.axis);
+  added.id = extended.back().id;
+  if (name.order)
+    for (std::size_t p = 0; p < added.parameters.size(); ++p)
+      if (name.entry->parameters[p].kind == effects::Kind::given) added.parameters[p].value = name.order;
+  after.effects.push_back(std::move(added));
+  return after;
+}
+
 Addition add(const data::Dataset& dataset, const model::Model& model, std::string_view effect,
              const estimation::PipelineOptions& options, const UserDefinition& given) {
   if (names_user_defined_effect(effect)) {
@@ -166,18 +182,7 @@ Addition add(const data::Dataset& dataset, const model::Model& model, std::strin
     return compare_models(dataset, model, after, own, std::string(effect), "add", options);
   }
   const EffectName name = parse_effect(effect);
-  const estimation::Terms terms = estimation::terms_of(model);
-  const estimation::Terms extended = extend(terms, *name.entry, name.order);  // checks that it may be added
-  model::Model after = model;
-  std::erase_if(after.effects, [&](const model::Effect& e) {
-    return std::none_of(extended.begin(), extended.end(), [&](const estimation::Term& t) { return t.id == e.id; });
-  });
-  model::Effect added = catalogue::blank_effect(*name.entry, model.drive.axis);
-  added.id = extended.back().id;
-  if (name.order)
-    for (std::size_t p = 0; p < added.parameters.size(); ++p)
-      if (name.entry->parameters[p].kind == effects::Kind::given) added.parameters[p].value = name.order;
-  after.effects.push_back(std::move(added));
+  const model::Model after = with_effect(model, name);
   return compare_models(dataset, model, after, name.entry->identified_on(), std::string(effect), "add", options);
 }
 

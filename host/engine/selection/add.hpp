@@ -39,6 +39,10 @@ struct EffectName {
 };
 EffectName parse_effect(std::string_view text);
 
+// The model with that effect, and without those that it replaces, not fitted yet. Throws model::ModelError where it
+// cannot be added.
+model::Model with_effect(const model::Model& model, const EffectName& name);
+
 // Adds an effect and refits everything, nonlinear parameters continuously. Experiments of role fit are fitted, those of
 // role holdout compared. Throws model::ModelError where the effect cannot be added and data::DataError where the data
 // cannot show it. A user-defined effect (see user_defined_effects.hpp) is described by `given`.

@@ -8,6 +8,7 @@
 
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/candidate_fits.hpp"
+#include "host/engine/selection/effect_names.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -27,19 +28,15 @@ bool is_worth_adding(const Diagnosis& first, const Diagnosis& now) {
   return drop(now) >= kPolicy.worth_adding * drop(first);
 }
 
-std::string label(const NamedEffect& named) {
-  return named.order ? fmt::format("{}:{:g}", named.effect, *named.order) : named.effect;
-}
-
 }  // namespace
 
 void StepwiseSelection::note_added(const NamedEffect& effect) {
-  std::erase(removed, label(effect));
+  std::erase(removed, label_of(effect));
   kept.push_back(effect);
 }
 
 bool StepwiseSelection::note_removed(const std::string& name) {
-  std::erase_if(kept, [&](const NamedEffect& effect) { return label(effect) == name; });
+  std::erase_if(kept, [&](const NamedEffect& effect) { return label_of(effect) == name; });
   removed.push_back(name);
   const bool again = std::ranges::find(ever_removed_, name) != ever_removed_.end();
   ever_removed_.push_back(name);
@@ -81,8 +78,8 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
                                      std::size_t most_rounds, const std::function<void(const Diagnosis&)>& progress) {
   StepwiseSelection result;
   result.model = model;
-  std::vector<std::string> added;               // ids of those that likelihood alone named: it may remove them, too
-  std::map<std::string, std::string> label_of;  // by id
+  std::vector<std::string> added;  // ids of those that likelihood alone named: it may remove them, too
+  std::map<std::string, std::string> label_by_id;
   for (;;) {
     Diagnosis found = diagnose(dataset, result.model, options);
     bool more = found.verdict == Verdict::missing_effect && result.rounds.size() + 1 < most_rounds;
@@ -90,7 +87,7 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
     if (more && !above && !result.rounds.empty() && !is_worth_adding(result.rounds.front(), found)) {
       found.warnings.push_back(
           fmt::format("{} is not added: it takes off less than {:g} % of what the first effect did",
-                      label(found.named.front()), 100.0 * kPolicy.worth_adding));
+                      label_of(found.named.front()), 100.0 * kPolicy.worth_adding));
       more = false;
     }
     result.rounds.push_back(std::move(found));
@@ -98,21 +95,21 @@ StepwiseSelection add_until_complete(const data::Dataset& dataset, const model::
     if (!more) return result;
     if (options.progress) options.progress("adding it");
     const NamedEffect newest = result.rounds.back().named.front();
-    result.model = add(dataset, result.model, label(newest), options.pipeline).model;
+    result.model = add(dataset, result.model, label_of(newest), options.pipeline).model;
     result.note_added(newest);
     // The newest was just named with the others in the model; only those are tried.
     const std::vector<std::string> before = added;
     const Diagnosis& last = result.rounds.back();
     if (!last.candidates.empty() && last.candidates.front().score > kPolicy.named_score) {
       added.push_back(result.model.effects.back().id);
-      label_of[added.back()] = label(newest);
+      label_by_id[added.back()] = label_of(newest);
     }
     if (before.empty()) continue;
     const std::string out = least_significant_effect(dataset, result.model, before, options);
     if (out.empty()) continue;
     result.model = remove(dataset, result.model, out, options.pipeline).model;
     std::erase(added, out);
-    if (result.note_removed(label_of[out])) return result;
+    if (result.note_removed(label_by_id[out])) return result;
   }
 }
 

@@ -306,6 +306,16 @@ void prefer_simple(const BalanceSearch& search, std::vector<CandidateFit>& candi
               candidates.begin() + static_cast<std::ptrdiff_t>(simplest) + 1);
 }
 
+CandidateFit refined(const BalanceSearch& search, const CandidateFit& candidate, const RegressionProblem* coarse) {
+  const RegressionProblem& data = *search.data;
+  CandidateModel model = candidate.model;
+  model.terms = candidate.fit.terms;
+  const auto on_balance = estimation::terms_on(model.terms, data.balance(), data.prepared().output_signals);
+  estimation::refine_nonlinear(data, model.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
+                               coarse);
+  return evaluate(search, std::move(model));
+}
+
 std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
                                           const std::function<bool(const CandidateModel&)>& is_tried) {
   std::vector<CandidateModel> tried =
@@ -332,15 +342,10 @@ std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
   }
   estimation::in_parallel(to_refine.size(), [&](std::size_t i) {
     CandidateFit& candidate = *to_refine[i];
-    const RegressionProblem& data = *search.data;
-    CandidateModel refined = candidate.model;
-    refined.terms = candidate.fit.terms;
-    const auto on_balance = estimation::terms_on(refined.terms, data.balance(), data.prepared().output_signals);
-    estimation::refine_nonlinear(data, refined.terms, on_balance, noise_covariance(data, candidate.fit), kSameSquares,
-                                 &coarse);
-    CandidateFit again = evaluate(search, std::move(refined));
+    CandidateFit again = refined(search, candidate, &coarse);
     // A value of the grid near an end of the range, where the best one stops, is no minimum either.
-    const bool stops = !why_no_minimum(data, again.fit.terms.back()).empty() && again.score() > candidate.score();
+    const bool stops =
+        !why_no_minimum(*search.data, again.fit.terms.back()).empty() && again.score() > candidate.score();
     if (fits_better(again, candidate) || !candidate.admissible || stops) candidate = std::move(again);
   });
   sort_candidates(search, candidates);

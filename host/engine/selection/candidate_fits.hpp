@@ -51,6 +51,9 @@ void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candida
 // nonlinear parameters searched continuously.
 std::vector<CandidateFit> rank_candidates(const BalanceSearch& search,
                                           const std::function<bool(const CandidateModel&)>& is_tried = {});
+// The same candidate with its nonlinear parameters searched continuously from where they are, with the noise that it
+// leaves. `coarse`: decimated samples for the first steps, or null.
+CandidateFit refined(const BalanceSearch& search, const CandidateFit& candidate, const RegressionProblem* coarse);
 // Best first: admissible ones before others, by score; of confounded ones that leave almost the same error, the
 // simplest.
 void sort_candidates(const BalanceSearch& search, std::vector<CandidateFit>& candidates);

@@ -195,7 +195,8 @@ void add_term(TableBuilder& builder, const Extension& e, TableBuilder::DirectedC
   term.is_placebo = e.is_placebo;
   if (term.is_placebo) {
     term.entry = nullptr;
-    term.name += " (an order that no drive has)";
+    term.name = fmt::format("{} that repeats {:.3g} times a turn of the motor, an order that no drive has",
+                            info.reads & effects::kDirection ? "friction" : "a torque", *e.order);
   }
   term.sum_is_positive = info.replaces.empty() && e.nonlinear > 0 && e.entry.count(Kind::linear) == 2;
   if (info.reads == effects::kCurrent && is_curved(columns.sign.rightCols(1), builder.sign.effort)) {

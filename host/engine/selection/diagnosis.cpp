@@ -26,6 +26,7 @@
 #include "host/engine/selection/presliding_fit.hpp"
 #include "host/engine/selection/record_cross_validation.hpp"
 #include "host/engine/selection/record_inertia.hpp"
+#include "host/engine/selection/refitted_names.hpp"
 #include "host/engine/selection/remainder.hpp"
 #include "host/engine/selection/resampling.hpp"
 #include "host/engine/selection/searched_balance.hpp"
@@ -199,14 +200,20 @@ const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const Chosen
   list_candidates(all, axis, result);
   if (by_resampling) name_stable(balance, result);
   if (by_likelihood) name_by_likelihood(balance, alias, result);
-  take_back_insignificant(result);
+  // Presliding has its travel and its errors after refit_presliding alone.
+  take_back_insignificant(result, false);
   return by_likelihood ? &balance.candidates.front() : nullptr;
 }
 
 // The delay of the effort that halves of the data agree on, and what to do about it.
 void assess_delay(const ChosenBalance& chosen, const estimation::PreparedData& prepared, Diagnosis& result) {
   if (chosen.method == Method::resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
-  if (result.delay_s) result.delay_advice = delay_advice(*result.delay_s, prepared);
+  if (!result.delay_s) return;
+  result.delay_advice = delay_advice(*result.delay_s, prepared);
+  const bool is_more_missing =
+      result.verdict == Verdict::nothing_significant || result.verdict == Verdict::unknown_structure;
+  if (is_more_missing && !result.delay_advice.empty())
+    result.delay_advice += " What the model lacks may look like it, too.";
 }
 
 // Friction differs between records on the motor's balance, whichever one was chosen.
@@ -258,7 +265,8 @@ void follow_taken_back(std::vector<SearchedBalance>& all, const SearchedBalance&
 //   check_unknown_structure        reads named; may replace verdict and names, or set partial
 //   look_between_records           reads named; may name what differs between records, and the motor's balance with it
 //   name_on_other_balances         reads named and verdict; appends names of the other balances
-//   refit_presliding, take_back_insignificant   change values and names by what was found before
+//   refit_presliding, take_back_insignificant, take_back_where_refit_holds_zero   change values and names by what was
+//                                  found before
 //   follow_taken_back              reads named; writes verdict where a name was taken back, and may find a structure
 // At the cut-off and the mask of the options: fits the model, chooses the balance where most is missing, names what it
 // lacks, tests the names against what differs between records, and says what is left.
@@ -305,6 +313,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
                          result);
   refit_presliding(dataset, model, options, chosen.motor, result);
   take_back_insignificant(result);
+  take_back_where_refit_holds_zero(dataset, model, options.pipeline, result);
   follow_taken_back(all, balance, likeliest, result);
   explain_orders(base->model.drive, result);
   assess_excitation(chosen.moves, result);

@@ -83,6 +83,9 @@ struct Candidate {
   std::optional<EffectSize> size;    // of named effects
   std::optional<Detectable> minimum_detectable;
   std::string note;  // what its values mean, where that differs from the effect's name
+  // Of presliding: what all samples, those around reversals among them, say against it. Nothing where they were not
+  // asked; empty where nothing does.
+  std::optional<std::string> presliding_doubt;
   // What on this drive makes its order, and which fact of the drive would tell more.
   std::vector<catalogue::OrderCause> order_causes;
   std::string order_hint;
@@ -211,6 +214,7 @@ struct Diagnosis {
   double base_rmse_cv = 0.0;
   bool reversals_left_out = false;      // of these errors, as alone presliding shows there
   double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
+  double effort_rms = 0.0;              // of the balance, with weights as for the errors
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   std::optional<NoiseOfSome> noise_of_some;

@@ -1,6 +1,12 @@
 #include "host/engine/selection/effect_names.hpp"
 
+#include <fmt/format.h>
+
 namespace flexspline::selection {
+
+std::string label_of(const NamedEffect& name) {
+  return name.order ? fmt::format("{}:{:g}", name.effect, *name.order) : name.effect;
+}
 
 bool is_of_family(const NamedEffect& a, const NamedEffect& b) {
   if (a.order != b.order) return false;

@@ -18,6 +18,9 @@ inline NamedEffect name_of(const Candidate& candidate) {
   return {candidate.effect, candidate.order};
 }
 
+// "torque_ripple:2".
+std::string label_of(const NamedEffect& name);
+
 // Whether two names are one, or two laws of a family: resampling has the nonlinear parameters at fixed values only, and
 // one law of presliding for all, so likelihood decides which law of the family it is.
 bool is_of_family(const NamedEffect& a, const NamedEffect& b);

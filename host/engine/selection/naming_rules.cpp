@@ -234,7 +234,10 @@ bool may_be_stated(const Resampling& resampling, const Resampling::FoundTerm& fo
   const bool is_enough =
       std::ranges::any_of(found.group, is_of_output_angle) ? found.is_most_of_held_out_error() : is_supported;
   return std::any_of(found.group.begin(), found.group.end(), [&](const NamedEffect& name) {
-    if (is_enough && (!leaves_known_noise || catalogue::get(name.effect).is_presliding())) return true;
+    // Held-out motions may show what is below the noise in the fitted ones.
+    if (is_enough &&
+        (!leaves_known_noise || found.is_most_of_held_out_error() || catalogue::get(name.effect).is_presliding()))
+      return true;
     return is_significant(motor, name);
   });
 }

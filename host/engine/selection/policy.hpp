@@ -113,6 +113,12 @@ struct SelectionPolicy {
   // the noise of the position.
   double fewest_reversals = 3.0;
   double longest_presliding = 1.0;
+  // Standard errors of the parts left out by which the error has to be larger without a travel: Student's t of five
+  // parts, one-sided 97.5 %.
+  double travel_errors = 2.776;
+  // Percent of the squared error that reversals add which a law of presliding has to explain. Of an axis that only
+  // sticks it explained 49 %, of ten of an engineer's axes with presliding 78 % and more (worlds 10 and 11).
+  double reversals_explained_percent = 66.0;
   double presliding_of_stroke = 0.25;
   double least_travel_noise = 4.0;
   double presliding_shape_factor = 4.0;  // of shorter and longer bristles over the travel of the law

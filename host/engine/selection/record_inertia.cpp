@@ -73,7 +73,8 @@ std::optional<RecordInertia> inertia_by_record(const estimation::Identification&
 std::string inertia_text(const RecordInertia& own) {
   return fmt::format(
       "{} differs between records ({:.4g} to {:.4g} {}): with a value for each of them {:.0f} % of the squared error "
-      "goes. Was the load changed? Then diagnose records of one load together; else an effect that acts with the "
+      "goes. Was the load changed, or the posture of other joints? Then diagnose records of one together; else an "
+      "effect that acts with the "
       "acceleration is missing, or their efforts come late by different times",
       own.parameter, own.least, own.most, own.unit, own.explains_percent);
 }

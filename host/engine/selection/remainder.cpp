@@ -27,7 +27,8 @@ std::string drift_text(const Drift& drift, const estimation::PreparedData& prepa
       "run counts for less then; repeat one motion from time to time",
       drift.group, drift.percent,
       has_temperature ? "The temperature is recorded: see whether an effect of it is named or possible."
-                      : "The usual cause is the temperature, which is not recorded: log it.");
+                      : "The temperature does that, which is not recorded, and so does a load or a posture of other "
+                        "joints that differs.");
 }
 
 }  // namespace
@@ -104,7 +105,8 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   });
   const Eigen::Index delay = after.theta.size() - 1;
   if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
-      std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay])
+      std::abs(after.theta[delay]) > kPolicy.delay_errors * after.std[delay] &&
+      std::abs(after.theta[delay]) <= kPolicy.longest_lag_s)
     result.delay_s = after.theta[delay];
   add_drifts(chosen, after, result);
   assess_verdict(chosen, after, result);

@@ -169,6 +169,9 @@ std::optional<UnknownStructure> find_unknown_structure(BalanceSearch& search, co
         s.curve.effective_degrees_of_freedom < best->curve.effective_degrees_of_freedom)
       best = &s;
   if (!is_significant(best->curve)) return std::nullopt;
+  // No structure of a drive bends over the acceleration, but noise and delay of the position do, which the error has
+  // in proportion to the inertia, and the acceleration twice differentiated.
+  if (best->specification.variable == Variable::acceleration) return std::nullopt;
   UnknownStructure unknown;
   unknown.effect = fmt::format("{}:{}", catalogue::kTableEffect, best->label);
   unknown.definition = *estimation::effect_of(best->specification, best->curve.table, "unknown").definition;

@@ -49,7 +49,8 @@ Candidate* candidate_of_name(Diagnosis& result, const NamedEffect& name) {
 // model has, or vanishes, so that the data do not show it.
 std::optional<std::string> undetermined_shape(const Candidate& candidate) {
   const catalogue::Entry* const entry = catalogue::find(candidate.effect);
-  if (!entry) return std::nullopt;
+  // What scales friction has no amplitude of its own; whether it is there, the friction of the records says.
+  if (!entry || entry->count(effects::Kind::linear) == 0) return std::nullopt;
   for (const estimation::Estimate& e : candidate.parameters) {
     const effects::ParameterInfo& info = entry->parameters[e.ref.parameter];
     if (info.kind == effects::Kind::nonlinear && !e.fixed && e.low && e.high && *e.low <= info.low &&
@@ -61,13 +62,11 @@ std::optional<std::string> undetermined_shape(const Candidate& candidate) {
 
 // Why a name is taken back; empty where it stays. An axis that sticks is confirmed by held-out experiments, too, as it
 // sticks there as well.
-std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
+std::string why_insignificant(Diagnosis& result, const NamedEffect& name, bool presliding) {
   const Candidate* const candidate = candidate_of_name(result, name);
   if (!candidate) return {};
-  if (has_unresolved_travel(*candidate))
-    return "the travel of presliding is too short for these samples to be distinguished from an axis that sticks at "
-           "each "
-           "reversal";
+  if (presliding)
+    if (std::string doubt = doubt_about_presliding(*candidate); !doubt.empty()) return doubt;
   if (is_confirmed_by_held_out(result, name)) return {};
   // Likelihood names no law whose nonlinear parameter is at an end of its range; halves do not ask.
   const bool halves_decide = result.resampling && result.resampling->decides;
@@ -79,30 +78,39 @@ std::string why_insignificant(Diagnosis& result, const NamedEffect& name) {
 
 }  // namespace
 
-bool has_unresolved_travel(const Candidate& candidate) {
+std::string doubt_about_presliding(const Candidate& candidate) {
+  if (candidate.presliding_doubt) return *candidate.presliding_doubt;
   const catalogue::Entry* const entry = catalogue::find(candidate.effect);
-  return entry && entry->is_presliding() &&
-         std::ranges::any_of(candidate.parameters, [&](const estimation::Estimate& e) {
-           return entry->parameters[e.ref.parameter].limit == effects::Limit::travel && !e.fixed && e.std &&
-                  e.value < estimation::half_width_under_bias(0.0) * *e.std;
-         });
+  const bool is_unresolved =
+      entry && entry->is_presliding() && std::ranges::any_of(candidate.parameters, [&](const estimation::Estimate& e) {
+        return entry->parameters[e.ref.parameter].limit == effects::Limit::travel && !e.fixed && e.std &&
+               e.value < estimation::half_width_under_bias(0.0) * *e.std;
+      });
+  return is_unresolved ? std::string(kUnresolvedTravel) : "";
 }
 
-void take_back_insignificant(Diagnosis& result) {
-  const auto is_insignificant = [&](const NamedEffect& name) { return !why_insignificant(result, name).empty(); };
+void take_back_insignificant(Diagnosis& result, bool presliding) {
+  const auto is_insignificant = [&](const NamedEffect& name) {
+    return !why_insignificant(result, name, presliding).empty();
+  };
   if (result.verdict == Verdict::confusable_effects &&
       !std::all_of(result.named.begin(), result.named.end(), is_insignificant))
     return;
   std::erase_if(result.named, [&](const NamedEffect& name) {
-    const std::string why = why_insignificant(result, name);
+    const std::string why = why_insignificant(result, name, presliding);
     if (why.empty()) return false;
-    Candidate* const candidate = candidate_of_name(result, name);
-    candidate->admissible = false;
-    candidate->why_not = why;
-    if (result.resampling && result.resampling->decides)
-      result.possible.push_back({{name}, candidate->why_not, std::nullopt, std::nullopt});
+    note_taken_back(result, name, why);
     return true;
   });
+}
+
+void note_taken_back(Diagnosis& result, const NamedEffect& name, const std::string& why) {
+  if (Candidate* const candidate = candidate_of_name(result, name)) {
+    candidate->admissible = false;
+    candidate->why_not = why;
+  }
+  if (result.resampling && result.resampling->decides)
+    result.possible.push_back({{name}, why, std::nullopt, std::nullopt});
 }
 
 }  // namespace flexspline::selection

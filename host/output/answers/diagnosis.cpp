@@ -71,6 +71,16 @@ std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   return listed(texts);
 }
 
+// "2.4 %": root mean square of the error over that of the effort.
+std::string share_of_effort(const Diagnosis& d) {
+  return d.effort_rms > 0.0 ? fmt::format("{:.2g} %", 100.0 * d.base_rmse / d.effort_rms) : "a part";
+}
+
+std::string explained_in_words(double percent) {
+  constexpr double kLeast = -100.0;  // beyond, it only says that the fit was left
+  return percent < kLeast ? "< -100 %" : fmt::format("{:.1f} %", percent);
+}
+
 std::string candidate_table(const Diagnosis& d, const model::Drive* drive) {
   Table table({"", "candidate", "balance", "score", "explains", "error before", "after", "", "smallest detectable", ""},
               "rllrrrrlll");
@@ -78,7 +88,7 @@ std::string candidate_table(const Diagnosis& d, const model::Drive* drive) {
   for (const Candidate& c : d.candidates) {
     if (++rank > kRowsShown) break;
     table.row({fmt::format("{}", rank), effect_label(c.effect, c.order), catalogue::balance_name(c.balance),
-               number(c.score), fmt::format("{:.1f} %", c.chi2_decrease_percent), number(c.rmse_cv_before),
+               number(c.score), explained_in_words(c.chi2_decrease_percent), number(c.rmse_cv_before),
                number(c.rmse_cv_after), d.unit, detectable_in_words(c, drive),
                c.admissible ? "" : "refused: " + c.why_not});
   }
@@ -200,6 +210,9 @@ std::string verdict_in_words(const Diagnosis& d) {
     case Verdict::confusable_effects:
       return fmt::format("The model lacks one of {}; these data cannot show which.", listed(names, "or"));
     case Verdict::at_noise_floor:
+      if (!d.possible.empty())
+        return "No effect can be named: the model's error is the noise of the measurement. What may be missing is "
+               "below.";
       if (d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
         return "Nothing is missing: friction differs from run to run, and otherwise the model's error is the noise "
                "of the measurement.";
@@ -212,11 +225,15 @@ std::string verdict_in_words(const Diagnosis& d) {
                            : d.noise_of_some ? "noise level is known in some records only"
                                              : "noise level is not known");
       if (d.noise_floor)
-        return "No effect of the catalogue improves the model. Its error is above the noise of the measurement, but "
-               "depends on no measured signal.";
+        return fmt::format(
+            "No effect of the catalogue improves the model. Its error is {:.2g} times the noise of the measurement, "
+            "but "
+            "depends on no measured signal.",
+            d.base_rmse / *d.noise_floor);
       return fmt::format(
-          "No effect of the catalogue improves the model. The noise level is {}, so a small effect may be missing.",
-          d.noise_of_some ? "known in some records only" : "not known");
+          "No effect of the catalogue improves the model. It leaves {} of the effort; how much of that is "
+          "noise is {}.",
+          share_of_effort(d), d.noise_of_some ? "known in some records only" : "not known");
     }
     case Verdict::unknown_structure:
       return d.possible.empty() ? "Something is missing that no effect of the catalogue explains."
@@ -281,7 +298,7 @@ std::string words(const std::vector<selection::NamedEffect>& group) {
 
 // What to record where an effect is neither shown nor ruled out.
 std::string what_decides(const Diagnosis& d, const selection::NamedEffect& effect) {
-  if (const Candidate* c = candidate_of(d, effect); c && selection::has_unresolved_travel(*c))
+  if (const Candidate* c = candidate_of(d, effect); c && !selection::doubt_about_presliding(*c).empty())
     return "slower reversals, or the same at a higher sample rate or with a finer encoder";
   const catalogue::Entry* entry = catalogue::find(effect.effect);
   return entry ? std::string(entry->info->separated_by) : "";
@@ -320,6 +337,17 @@ void print_sizes(Console& console, const Diagnosis& d) {
   if (!sizes.empty()) console.line(wrapped(words_on(axis_of(d.unit), sizes + ".")));
 }
 
+// What acts on one joint of an arm while others move is in no effect.
+constexpr std::string_view kOtherAxes =
+    "If other axes of the machine move in these records, their torque is a part of this error: map it, computed from "
+    "the "
+    "arm's model, as load_torque_nm, or move one joint alone.";
+bool may_be_other_axes(const Diagnosis& d) {
+  constexpr double kLargeShare = 0.05;
+  const bool is_open = d.verdict == Verdict::nothing_significant || d.verdict == Verdict::unknown_structure;
+  return is_open && d.base_rmse > kLargeShare * d.effort_rms;
+}
+
 // A delay of a sample or more is a cause by itself, which is to be removed first. It is stated where it is significant.
 bool is_delay_first(const Diagnosis& d, const data::Dataset* dataset) {
   if (!d.delay_s || d.delay_advice.empty() || !dataset) return false;
@@ -335,6 +363,9 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   const std::string delay = d.delay_advice.empty() ? "" : wrapped(words_on(axis, d.delay_advice));
   const bool delay_first = is_delay_first(d, dataset);
   if (delay_first) console.line(delay);
+  const std::string untried = d.untried_advice.empty() ? "" : wrapped(words_on(axis, d.untried_advice));
+  const bool untried_first = d.named.empty() && d.verdict != Verdict::at_noise_floor;
+  if (!untried.empty() && untried_first) console.line(untried);
   print_sizes(console, d);
   console.line(wrapped(evidence(d)));
   if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
@@ -342,7 +373,8 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (!d.localised.empty())
     console.line(wrapped(words_on(axis, fmt::format("The error depends on {}.", shares(d.localised)))));
   if (!delay.empty() && !delay_first) console.line(delay);
-  if (!d.untried_advice.empty()) console.line(wrapped(words_on(axis, d.untried_advice)));
+  if (!untried.empty() && !untried_first) console.line(untried);
+  if (may_be_other_axes(d)) console.line(wrapped(words_on(axis, std::string(kOtherAxes))));
   for (const selection::NamedEffect& named : d.named)
     if (const Candidate* c = candidate_of(d, named)) print_explanation(console, *c, d.unit, drive);
   if (d.law_in_range) console.line(wrapped(law_in_range_text(*d.law_in_range)));

@@ -98,6 +98,15 @@ export function times(excess: number | null | undefined): string {
   return excess === null || excess === undefined ? "–" : `${excess >= 100 ? excess.toFixed(0) : excess >= 10 ? excess.toFixed(1) : excess.toFixed(2)}×`;
 }
 
+// What is subtracted from a record's times where its column has a date in seconds, as the tool's messages do it.
+export function startOfTimes(begin: number): number {
+  return Math.abs(begin) < 1000 ? 0 : begin;
+}
+
+export function timeLabel(start: number): string {
+  return start === 0 ? "time (s)" : "time after the first sample (s)";
+}
+
 // By how much a value has changed, of what it was before.
 export function relative(before: number | null | undefined, after: number | null | undefined): string {
   if (before === null || before === undefined || after === null || after === undefined) return "new";

@@ -1,7 +1,7 @@
 // 3. What is missing? The verdict, candidates by what they take off the error of left-out data, and what each means.
 import type uPlot from "uplot";
 import type { Candidate, Diagnosis, State } from "./api";
-import { bar, button, el, fill, num, unit, withUnit, words } from "./dom";
+import { bar, button, el, fill, num, startOfTimes, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, kHidden, line, stretchedScale, stretchedSplits } from "./plots";
 import { stepKey } from "./store";
 
@@ -61,7 +61,7 @@ export class Missing {
       shown.length ? el("div", { class: "side", role: "listbox", "aria-label": "Candidates, best first", "data-scroll": "candidates",
         keydown: ((e: KeyboardEvent) => this.arrows(e)) as (event: never) => void }, shown.map((c) => this.row(c, found, state))) : null);
     fill(this.body, list, el("div", { class: "column grow details", "data-scroll": "details", tabindex: 0, role: "region", "aria-label": "What it means" },
-      chosen ? this.details(chosen, found, state) : unknown ? this.unknown(unknown, state) : this.nothing(found, good)));
+      chosen ? this.details(chosen, found, state) : unknown ? this.unknown(unknown, state) : this.nothing(found, good, state)));
     if (chosen) this.drawEvidence(chosen); else if (unknown) this.drawUnknown(unknown);
   }
 
@@ -100,12 +100,13 @@ export class Missing {
     ];
   }
 
-  private nothing(found: Diagnosis, good: boolean): HTMLElement {
+  private nothing(found: Diagnosis, good: boolean, state: State): HTMLElement {
+    const start = (name: string) => startOfTimes(state.experiments.find((x) => x.name === name)?.begin_s ?? 0);
     return el("div", { class: "waiting" }, el("div", { class: `seal ${good ? "fine" : "open"}`, "aria-hidden": "true" }, good ? "✓" : "?"),
       el("p", {}, good ? "What the model leaves is the noise of the measurement. Save the model, or pack it for a drive." : found.verdict === "insufficient_excitation"
         ? "Record motions that reverse, that go slow and fast, and with load; flexspline plan designs them." : "No effect helps. More or other motions may show one: flexspline plan designs them."),
       found.base.noise_floor ? el("p", { class: "soft" }, `error ${withUnit(found.base.rmse, found.base.unit ?? "")}, noise ${withUnit(found.base.noise_floor, found.base.unit ?? "")}`) : null,
-      found.disturbances.length ? el("p", {}, `${found.disturbances.length} disturbance(s) from outside: ${found.disturbances.slice(0, 3).map((d) => `${d.experiment} at ${num(d.from_s, 3)} s`).join(", ")}`) : null);
+      found.disturbances.length ? el("p", {}, `${found.disturbances.length} disturbance(s) from outside: ${found.disturbances.slice(0, 3).map((d) => `${d.experiment} at ${num(d.from_s - start(d.experiment), 3)} s${start(d.experiment) ? " after the first sample" : ""}`).join(", ")}`) : null);
   }
 
   private unknown(u: UnknownCurve, state: State): HTMLElement[] {

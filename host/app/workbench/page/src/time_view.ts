@@ -1,7 +1,7 @@
 // One experiment over time: measured and model above, the error with its noise band below, zoom and pan linked.
 import uPlot from "uplot";
 import { get, unpack, type Packed } from "./api";
-import { el, unit, withUnit, words } from "./dom";
+import { el, startOfTimes, timeLabel, unit, withUnit, words } from "./dom";
 import { axes, colour, Figure, line, shade } from "./plots";
 
 interface Answer { from_s: number; to_s: number; whole: boolean; time: Packed; measured: Packed; model: Packed; residual: Packed; unit: string; noise_floor: number | null }
@@ -19,6 +19,8 @@ export class TimeView {
     this.head, this.problem, this.upper.holder, this.lower.holder);
   private shown: Shown | null = null;
   private key = "";
+  // Times here are after this one: it is subtracted from what the server has.
+  private start = 0;
   private from = 0;
   private to = 1;
   private chunk: Chunk | null = null;
@@ -36,7 +38,9 @@ export class TimeView {
   }
 
   // `key` tells whether curves must be fetched again.
-  show(shown: Shown, key: string): void {
+  show(asked: Shown, key: string): void {
+    const start = (this.start = startOfTimes(asked.begin));
+    const shown: Shown = { ...asked, begin: asked.begin - start, end: asked.end - start, stretches: asked.stretches.map(([from, to]) => [from - start, to - start]) };
     const same = this.shown?.experiment === shown.experiment && this.shown.begin === shown.begin && this.shown.end === shown.end;
     this.shown = shown;
     if (!same) [this.from, this.to] = [shown.begin, shown.end];
@@ -56,19 +60,19 @@ export class TimeView {
     const key = this.key;
     const span = this.to - this.from;
     const from = overview ? shown.begin : Math.max(shown.begin, this.from - span), to = overview ? shown.end : Math.min(shown.end, this.to + span);
-    const query = { experiment: shown.experiment, signal: shown.signal, from, to, points: 2 * this.columns() * (overview ? 1 : 3) };
+    const start = this.start, query = { experiment: shown.experiment, signal: shown.signal, from: from + start, to: to + start, points: 2 * this.columns() * (overview ? 1 : 3) };
     try {
       const now = get<Answer>("trace", query, abort.signal);
       const before = shown.before === null ? null : get<Answer>("trace", { ...query, step: shown.before }, abort.signal).catch(() => null);
-      const o = shown.overlay, shift = o ? o.begin - shown.begin : 0;
+      const o = shown.overlay, shift = o ? o.begin - shown.begin : start;
       const over = o && from + shift < o.end ? get<Answer>("trace", { ...query, experiment: o.experiment, from: from + shift, to: Math.min(o.end, to + shift) }, abort.signal).catch(() => null) : null;
       const answer = await now, old = await before, other = await over;
       if (key !== this.key) return;
-      const time = unpack(answer.time);
+      const time = after(start, unpack(answer.time));
       const residual = old ? unpack(old.residual) : null;
       const chunk: Chunk = { from, to, whole: answer.whole, unit: answer.unit, floor: answer.noise_floor, data: [time, unpack(answer.measured), unpack(answer.model), unpack(answer.residual)],
         before: residual && residual.length === time.length ? residual : null,
-        overlay: other ? { time: unpack(other.time).map((t) => (t === null ? null : t - shift)), measured: unpack(other.measured), residual: unpack(other.residual) } : null };
+        overlay: other ? { time: after(shift, unpack(other.time)), measured: unpack(other.measured), residual: unpack(other.residual) } : null };
       if (overview) this.overview = chunk;
       this.chunk = chunk;
       this.problem.hidden = true;
@@ -122,7 +126,7 @@ export class TimeView {
     const options = (x: string, y: string, series: uPlot.Series[], under: (u: uPlot) => void): Partial<uPlot.Options> => ({
       scales: { x: { time: false, range: () => [this.from, this.to] } },
       axes: axes(x, y),
-      series: [{ label: "time (s)" }, ...series],
+      series: [{ label: timeLabel(this.start) }, ...series],
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
       hooks: {
         drawClear: [(u) => { for (const [from, to] of shown.stretches) shade(u, colour("brush"), from, to, "x"); under(u); }],
@@ -146,7 +150,7 @@ export class TimeView {
     this.upper.show(() => ({ data: with_([time, measured, model], c.overlay?.measured), options: options("", unit(c.unit), [line("measured"), line("model", { dash: [7, 4] }), ...overlaid], () => undefined) }));
     this.lower.show(() => ({
       data: with_(c.before ? [time, residual, c.before] : [time, residual], c.overlay?.residual),
-      options: options("time (s)", `error (${unit(c.unit)})`, [line("residual"), ...(c.before ? [line("before", { dash: [2, 3], alpha: 0.8 })] : []), ...overlaid],
+      options: options(timeLabel(this.start), `error (${unit(c.unit)})`, [line("residual"), ...(c.before ? [line("before", { dash: [2, 3], alpha: 0.8 })] : []), ...overlaid],
         (u) => { if (c.floor) shade(u, colour("noise"), -2 * c.floor, 2 * c.floor, "y"); }),
     }));
     this.element.dataset.drawn = `${shown.experiment} ${shown.signal}`;
@@ -200,6 +204,10 @@ export class TimeView {
     e.preventDefault();
     act();
   }
+}
+
+function after(start: number, times: (number | null)[]): (number | null)[] {
+  return start === 0 ? times : times.map((t) => (t === null ? null : t - start));
 }
 
 // Index of the time that is nearest, of times in order.
