@@ -56,16 +56,16 @@ TEST(PreslidingFit, HasTheTravelAndTheFrictionOfAllSamplesAndTheErrorsThatItTake
   ASSERT_TRUE(law->evidence.has_value());
 }
 
-TEST(PreslidingFit, WhoseTravelIsShorterThanTheMotionBetweenTwoSamplesIsNeitherNamedNorTheVerdictOfAMissingEffect) {
-  const Diagnosis found = diagnose(axis(100.0, 0.05), tests::plain_model(), {});
+TEST(PreslidingFit, WhoseTravelIsThatOfTheMotionBetweenTwoSamplesIsNeitherNamedNorTheVerdictOfAMissingEffect) {
+  const Diagnosis found = diagnose(axis(100.0, 0.02), tests::plain_model(), {});
   EXPECT_TRUE(found.named.empty());
   EXPECT_NE(found.verdict, Verdict::missing_effect);
   EXPECT_FALSE(found.recovered_percent);
   const auto law = std::ranges::find(found.candidates, "dahl_friction", &Candidate::effect);
   ASSERT_NE(law, found.candidates.end());
   EXPECT_NE(law->note.find("around reversals"), std::string::npos) << "it was named until it was fitted with them";
-  ASSERT_EQ(found.possible.size(), 1U);
-  EXPECT_EQ(found.possible.front().group.front().effect, "dahl_friction");
+  EXPECT_TRUE(std::ranges::any_of(
+      found.possible, [](const PossibleEffect& possible) { return possible.group.front().effect == "dahl_friction"; }));
 }
 
 }  // namespace
