@@ -117,7 +117,7 @@ struct SelectionPolicy {
   // parts, one-sided 97.5 %.
   double travel_errors = 2.776;
   // Percent of the squared error that reversals add which a law of presliding has to explain. Of an axis that only
-  // sticks it explained 49 %, of ten of an engineer's axes with presliding 78 % and more (worlds 10 and 11).
+  // sticks it explained 49 %, of nine with presliding 80 % and more (logs of two engineers, by hand).
   double reversals_explained_percent = 66.0;
   double presliding_of_stroke = 0.25;
   double least_travel_noise = 4.0;
