@@ -50,6 +50,9 @@ TEST(PositionSide, OfTheLinkWithTheCurrentOfTheMotorGivesTheMotorsInertiaByOneOp
   // ... or the user does.
   shell.write("log.csv", joint_log("time,pos,vel,iq"));
   EXPECT_NEAR(inertia_of(shell, "--gear-ratio 100 --position-side link"), kJ, 0.02 * kJ);
+  // In the tool's own names, too.
+  shell.write("log.csv", joint_log("time_s,output_position_rad,output_velocity_rad_s,current_a"));
+  EXPECT_NEAR(inertia_of(shell, "--gear-ratio 100 --position-side link"), kJ, 0.02 * kJ);
   // A log of the motor stays as it is.
   shell.write("log.csv", joint_log("time,pos,vel,iq", 1.0));
   EXPECT_NEAR(inertia_of(shell, "--gear-ratio 100 --position-side motor"), kJ, 0.02 * kJ);

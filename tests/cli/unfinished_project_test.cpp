@@ -1,4 +1,5 @@
 // `new` leaves what it could find where it cannot finish, and the line to go on with.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,6 +39,24 @@ TEST(UnfinishedProject, HoldsWhatWasFoundAndTheLineOnStandardErrorGoesOn) {
   line = "flexspline new --from log.csv --out project --map time_s=clock --map motor_position_rad=kappa";
   shell.must(line);  // without --force: the draft is written over
   EXPECT_TRUE(fs::exists(shell.folder() / "project/base-model.toml"));
+}
+
+TEST(UnfinishedProject, OfADatasetTomlProposesNoMapAsThatMapsTheColumns) {
+  const Shell shell;
+  std::string log = "t,i,q\n";
+  for (int k = 0; k < 400; ++k)
+    log += fmt::format("{},{},{}\n", 4e-3 * k + (k % 2 ? 1.5e-3 : 0.0), 0.1 * std::sin(0.02 * k), std::sin(0.01 * k));
+  shell.write("log.csv", log);
+  shell.write(
+      "dataset.toml",
+      "format = \"flexspline-dataset/1\"\n[columns.time_s]\nsource = \"t\"\n[columns.current_a]\nsource = \"i\"\n"
+      "[columns.motor_position_rad]\nsource = \"q\"\n[[experiment]]\nfile = \"log.csv\"\n");
+  const Answer answer = shell.run("flexspline new --from dataset.toml --out project --torque-constant 0.1");
+  EXPECT_EQ(answer.code, 2);
+  const std::string line = line_to_go_on_with(answer.err);
+  EXPECT_TRUE(contains(line, "--tolerate jitter")) << answer.err;
+  EXPECT_FALSE(contains(line, "--map")) << answer.err;
+  shell.must(line);
 }
 
 TEST(UnfinishedProject, ADraftThatWasChangedByHandIsNotWrittenOver) {

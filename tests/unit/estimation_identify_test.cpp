@@ -6,6 +6,8 @@
 #include <functional>
 #include <random>
 
+#include "tests/support/written_experiment.hpp"
+
 namespace flexspline::estimation::estimation_identify_test {
 namespace {
 
@@ -173,6 +175,29 @@ TEST(Identify, AHeldEffortIsAlignedByHalfASample) {
   };
   EXPECT_NEAR(delay(*aligned), 0.0, 1e-5);
   EXPECT_NEAR(delay(*early), -0.5e-3, 0.5e-4) << "an effort that stands half a sample too early";
+}
+
+// Beside a torque sensor most of the effort goes through the gear; a late current is late with that part, too.
+TEST(Identify, ALateEffortBesideATorqueSensorIsLateByThatTime) {
+  constexpr double kLate_s = 0.6e-3, kThroughGear_nm = 0.3;
+  data::Experiment e = tests::written_experiment("late", 1e-3, 8000, [](double t, data::Experiment& record) {
+    const auto gear = [](double at) { return kThroughGear_nm * std::sin(2.0 * kPi * 1.7 * at); };
+    const auto rate = [](double at) {
+      return 5.0 * std::cos(2.0 * kPi * 0.4 * at) + 2.0 * std::cos(2.0 * kPi * 1.3 * at);
+    };
+    const auto slope = [](double at) {
+      return -2.0 * kPi * (0.4 * 5.0 * std::sin(2.0 * kPi * 0.4 * at) + 1.3 * 2.0 * std::sin(2.0 * kPi * 1.3 * at));
+    };
+    const auto effort = [&](double at) { return kInertia * slope(at) + kViscous * rate(at) + gear(at); };
+    record[Column::motor_position].push_back(5.0 / (2.0 * kPi * 0.4) * std::sin(2.0 * kPi * 0.4 * t) +
+                                             2.0 / (2.0 * kPi * 1.3) * std::sin(2.0 * kPi * 1.3 * t));
+    record[Column::motor_torque].push_back(effort(t - kLate_s));
+    record[Column::torque].push_back(gear(t));
+  });
+  e.current_hold = data::CurrentHold::none;
+  const auto found = identify(dataset_of({e}), model_of({"inertia", "viscous_friction"}), kOptions);
+  const Eigen::VectorXd& slope = found->data[0].delay_column();
+  EXPECT_NEAR(slope.dot(found->fits[0].residual) / slope.squaredNorm(), kLate_s, 0.1 * kLate_s);
 }
 
 TEST(Identify, WithoutATorqueSensorLoadTermsReachTheMotorOverTheGearRatio) {

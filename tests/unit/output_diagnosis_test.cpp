@@ -82,8 +82,9 @@ TEST(DiagnosisAnswer, DoesNotSayThatTheNoiseIsUnknownWhereItIsKnown) {
   selection::Diagnosis d;
   d.verdict = selection::Verdict::nothing_significant;
   d.base_rmse = 0.024;
-  d.effort_rms = 0.1;
-  EXPECT_NE(verdict_in_words(d).find("It leaves 24 % of the effort; how much of that is noise is not known."),
+  d.target_rms = 0.1;
+  EXPECT_NE(verdict_in_words(d).find("It leaves 24 % of the motor balance's measured side; how much of that is noise "
+                                     "is not known."),
             std::string::npos);
   d.noise_floor = 1e-3;
   EXPECT_NE(verdict_in_words(d).find("Its error is 24 times the noise"), std::string::npos);

@@ -62,6 +62,19 @@ TEST(NamingRules, RefuseWhatFewHalvesChoseWithoutConfirmation) {
   EXPECT_EQ(why_not(term), "the squared error on experiments that are held out falls by 2.0 % only");
 }
 
+// Held-out motions may show what the fitted ones hide in their noise.
+TEST(NamingRules, NameAtAKnownFloorWhatHalvesTheSquaredHeldOutError) {
+  SearchedBalance at_floor = motor();
+  at_floor.search.base.residual.setConstant(1.0);
+  Resampling resampling;
+  resampling.subsamples = 100.0;
+  Resampling::FoundTerm term = found({"quadratic_drag"});
+  term.held_out_ratio = 0.70;
+  EXPECT_TRUE(may_be_stated(resampling, term, at_floor));
+  term.held_out_ratio = 0.72;
+  EXPECT_FALSE(may_be_stated(resampling, term, at_floor));
+}
+
 TEST(NamingRules, RefuseASecondChoiceWithoutConfirmation) {
   Resampling::FoundTerm term = found({"quadratic_drag"});
   term.is_second_choice = true;

@@ -56,7 +56,7 @@ void describe_base(const SearchedBalance& chosen, Diagnosis& result) {
   result.base_rmse = fit.rmse_fixed_effects();
   result.base_rmse_cv = fit.rmse_cv_fixed_effects();
   result.base_rmse_own_friction = fit.rmse();
-  result.effort_rms = rmse_of(data.target(), fit.root_weights);
+  result.target_rms = rmse_of(data.target(), fit.root_weights);
   result.noise_floor = chosen.floor.rmse;
   result.noise_floor_from = chosen.floor.from;
   result.noise_of_some = noise_of_some(chosen);

@@ -214,7 +214,7 @@ struct Diagnosis {
   double base_rmse_cv = 0.0;
   bool reversals_left_out = false;      // of these errors, as alone presliding shows there
   double base_rmse_own_friction = 0.0;  // with each run's own friction where it differs from run to run
-  double effort_rms = 0.0;              // of the balance, with weights as for the errors
+  double target_rms = 0.0;              // of the measured side of the balance, with weights as for the errors
   std::optional<double> noise_floor;
   std::string noise_floor_from = "none";
   std::optional<NoiseOfSome> noise_of_some;

@@ -71,9 +71,9 @@ std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   return listed(texts);
 }
 
-// "2.4 %": root mean square of the error over that of the effort.
-std::string share_of_effort(const Diagnosis& d) {
-  return d.effort_rms > 0.0 ? fmt::format("{:.2g} %", 100.0 * d.base_rmse / d.effort_rms) : "a part";
+// "2.4 %": root mean square of the error over that of the measured side of the balance.
+std::string share_of_target(const Diagnosis& d) {
+  return d.target_rms > 0.0 ? fmt::format("{:.2g} %", 100.0 * d.base_rmse / d.target_rms) : "a part";
 }
 
 std::string explained_in_words(double percent) {
@@ -231,9 +231,10 @@ std::string verdict_in_words(const Diagnosis& d) {
             "depends on no measured signal.",
             d.base_rmse / *d.noise_floor);
       return fmt::format(
-          "No effect of the catalogue improves the model. It leaves {} of the effort; how much of that is "
-          "noise is {}.",
-          share_of_effort(d), d.noise_of_some ? "known in some records only" : "not known");
+          "No effect of the catalogue improves the model. It leaves {} of the {} balance's measured side; how much of "
+          "that is noise is {}.",
+          share_of_target(d), catalogue::balance_name(d.balance.value_or(estimation::Balance::motor)),
+          d.noise_of_some ? "known in some records only" : "not known");
     }
     case Verdict::unknown_structure:
       return d.possible.empty() ? "Something is missing that no effect of the catalogue explains."
@@ -345,7 +346,7 @@ constexpr std::string_view kOtherAxes =
 bool may_be_other_axes(const Diagnosis& d) {
   constexpr double kLargeShare = 0.05;
   const bool is_open = d.verdict == Verdict::nothing_significant || d.verdict == Verdict::unknown_structure;
-  return is_open && d.base_rmse > kLargeShare * d.effort_rms;
+  return is_open && d.base_rmse > kLargeShare * d.target_rms;
 }
 
 // A delay of a sample or more is a cause by itself, which is to be removed first. It is stated where it is significant.
