@@ -81,6 +81,7 @@ TEST(DecidingMethod, IsLikelihoodForWhatHalvesCannotChooseAndExplainsNearlyAll) 
   SearchedBalance motor = motor_with("current_saturation");
   Resampling nothing;
   nothing.subsamples = 100.0;
+  motor.candidates.front().gain.chi2_percent = 100.0 * kPolicy.most_share - 1.0;
   EXPECT_EQ(deciding_method(nothing, motor), Method::resampling);
   motor.candidates.front().gain.chi2_percent = kPolicy.nearly_all_percent + 0.5;
   EXPECT_EQ(deciding_method(nothing, motor), Method::likelihood);
@@ -98,7 +99,7 @@ TEST(DecidingMethod, IsResamplingWhereHalvesDidNotChooseTheLikeliestUnlessMostAb
   SearchedBalance motor = motor_near_noise_with("quadratic_drag");
   Resampling few = halves_that_chose("quadratic_drag", kPolicy.named_frequency - 0.1);
   EXPECT_EQ(deciding_method(few, motor), Method::resampling);
-  few.abstained = 100.0 * kPolicy.most_abstaining + 1.0;
+  few.abstained = 100.0 * kPolicy.most_abstaining_to_judge + 1.0;
   EXPECT_EQ(deciding_method(few, motor), Method::likelihood);
 }
 

@@ -113,12 +113,19 @@ TEST(NamingRules, RefuseASmallShareBehindANameUnlessHeldOutDataConfirmItStrongly
   EXPECT_NE(why_not(term, kBefore).find("4.9 % of the squared error"), std::string::npos);
 }
 
-TEST(NamingRules, RefuseWhatIsNotCertainBehindANameUnlessHeldOutDataConfirmIt) {
+TEST(NamingRules, RefuseWhatIsNotCertainUnlessHeldOutDataConfirmIt) {
   Resampling::FoundTerm term = found({"quadratic_drag"});
   term.frequency = kPolicy.certain_frequency - 0.01;
   term.held_out_ratio = 0.99;
   EXPECT_EQ(why_not(term), "");
   EXPECT_EQ(why_not(term, kBefore), "the squared error on experiments that are held out falls by 2.0 % only");
+  term.frequency = kPolicy.unconfirmed_frequency - 0.01;
+  EXPECT_EQ(why_not(term), "the squared error on experiments that are held out falls by 2.0 % only");
+  term.held_out_ratio = 0.97;
+  EXPECT_EQ(why_not(term), "");
+  term.held_out_ratio.reset();
+  EXPECT_EQ(why_not(term), "");
+  term.held_out_ratio = 0.99;
   term.frequency = kPolicy.certain_frequency;
   EXPECT_EQ(why_not(term, kBefore), "");
 }

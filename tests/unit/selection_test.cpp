@@ -292,23 +292,23 @@ TEST(ForwardSelection, AbstainsWhereTheModelAloneDoesNotCarryOver) {
   EXPECT_TRUE(select_forward(r.table, a, b, {1e-4, 1.0}, {}).abstains);
 }
 
+TEST(ForwardSelection, ChoosesATermWithoutWhichTheModelDoesNotCarryOver) {
+  Random r = random_table(400, 2, 4);
+  r.rows.topRows(200).col(2) *= 0.1;
+  r.rows.col(4) = 0.01 * r.rows.col(4) + r.rows.col(0) + r.rows.col(2);
+  const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
+  const SelectionPath selected = select_forward(r.table, a, b, {1e-4, 1.0}, {});
+  EXPECT_FALSE(selected.abstains);
+  ASSERT_EQ(selected.steps.size(), 1U);
+  EXPECT_EQ(selected.steps[0].term, 0);
+}
+
 TEST(ForwardSelection, ATermOfImpossibleSignIsNotChosen) {
   Random r = random_table(400, 20, 5);
   r.table.terms[7].low = {0.0};
   r.rows.col(22) = 0.1 * r.rows.col(22) - 0.4 * r.rows.col(9);
   const HalfData a = half_of(r.rows.topRows(200)), b = half_of(r.rows.bottomRows(200));
   EXPECT_TRUE(select_forward(r.table, a, b, {0.01, 1.0}, {}).steps.empty());
-}
-
-TEST(Semivariance, IsTheVarianceOfWhiteNoiseAndNothingOfAConstant) {
-  std::mt19937_64 chance(6);
-  std::normal_distribution<double> normal;
-  Setting setting;
-  setting.cutoff_hz = 10.0;
-  setting.runs = {{0, 0, 20000, 0.025}};
-  const Eigen::VectorXd noise = Eigen::VectorXd::NullaryExpr(20000, [&] { return normal(chance); });
-  EXPECT_NEAR(semivariance(setting, noise), 1.0, 0.03);
-  EXPECT_EQ(semivariance(setting, Eigen::VectorXd::Constant(20000, 3.0)), 0.0);
 }
 
 Frequency frequency(std::string name, double often, double near, double share) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host/engine/selection/deciding_method.hpp"
+#include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection::selection_unseen_by_halves_test {
 namespace {
@@ -17,6 +18,12 @@ CandidateFit delay(double chi2_percent, std::optional<double> held_out_ratio) {
   return candidate;
 }
 
+std::vector<CandidateFit> alone(double chi2_percent, std::optional<double> held_out_ratio) {
+  std::vector<CandidateFit> one;
+  one.push_back(delay(chi2_percent, held_out_ratio));
+  return one;
+}
+
 Resampling nothing_found() {
   Resampling resampling;
   resampling.subsamples = 100.0;
@@ -24,43 +31,29 @@ Resampling nothing_found() {
 }
 
 TEST(EffectThatHalvesCannotChoose, IsNamedWhereItTakesOffMostOfTheErrorAndHeldOutDataConfirmIt) {
-  EXPECT_TRUE(stands_alone(nothing_found(), delay(51.0, 0.89)));
+  EXPECT_TRUE(stands_alone(nothing_found(), alone(51.0, 0.89)));
 }
 
 TEST(EffectThatHalvesCannotChoose, IsNotNamedForLessThanHalfOfTheError) {
-  EXPECT_FALSE(stands_alone(nothing_found(), delay(49.0, 0.70)));
+  EXPECT_FALSE(stands_alone(nothing_found(), alone(49.0, 0.70)));
 }
 
-TEST(EffectThatHalvesCannotChoose, IsNotNamedWithoutHeldOutDataThatConfirmIt) {
-  EXPECT_FALSE(stands_alone(nothing_found(), delay(80.0, 0.90)));
-  EXPECT_FALSE(stands_alone(nothing_found(), delay(80.0, std::nullopt)));
+TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHeldOutDataDoNotConfirmIt) {
+  EXPECT_FALSE(stands_alone(nothing_found(), alone(80.0, 0.90)));
 }
 
-// The effort leads by 5 ms, which explains a share of what is above the noise. The model that the delay is compared
-// with has that lag, so that little is left for the likelihood.
-TEST(EffectThatHalvesCannotChoose, MayBeALagThatExplainsMostOfTheErrorAndOfThatOnHeldOutData) {
-  Resampling leads = nothing_found();
-  leads.lag_s = -5e-3;
-  leads.lag_share = 0.6;
-  EXPECT_TRUE(stands_alone(leads, delay(3.0, 0.70)));
-  EXPECT_FALSE(stands_alone(leads, delay(3.0, 0.71)));
-  leads.lag_share = 0.4;
-  EXPECT_FALSE(stands_alone(leads, delay(3.0, 0.70)));
-  // The current that is logged late is no effect of the catalogue.
-  Resampling lags = nothing_found();
-  lags.lag_s = 5e-3;
-  lags.lag_share = 0.6;
-  EXPECT_FALSE(stands_alone(lags, delay(3.0, 0.70)));
-}
-
-TEST(EffectThatHalvesCannotChoose, WithoutHeldOutDataALagThatExplainsMostNeedsAFifthOfTheLeftOutSquares) {
-  Resampling leads = nothing_found();
-  leads.lag_s = -5e-3;
-  leads.lag_share = 0.6;
-  EXPECT_TRUE(stands_alone(leads, delay(20.0, std::nullopt)));
-  EXPECT_FALSE(stands_alone(leads, delay(19.9, std::nullopt)));
-  leads.lag_share = 0.49;
-  EXPECT_FALSE(stands_alone(leads, delay(80.0, std::nullopt)));
+TEST(EffectThatHalvesCannotChoose, WithoutHeldOutDataNoOtherEffectMayExplainAnyPart) {
+  std::vector<CandidateFit> candidates = alone(58.0, std::nullopt);
+  EXPECT_TRUE(stands_alone(nothing_found(), candidates));
+  candidates.push_back(candidates.front());
+  candidates.back().model.entry = &catalogue::get("torque_constant_saturation");
+  candidates.back().gain.score = 2.0 * kPolicy.named_score;
+  candidates.back().gain.chi2_percent = 4.9;
+  EXPECT_TRUE(stands_alone(nothing_found(), candidates));
+  candidates.back().gain.chi2_percent = 5.1;
+  EXPECT_FALSE(stands_alone(nothing_found(), candidates));
+  candidates.back().gain.score = 0.5 * kPolicy.named_score;
+  EXPECT_TRUE(stands_alone(nothing_found(), candidates));
 }
 
 TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHalvesFindSomethingElse) {
@@ -69,7 +62,7 @@ TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHalvesFindSomethingElse) {
   found.group = {{"quadratic_drag", std::nullopt}};
   found.frequency = 0.7;
   resampling.found = {found};
-  EXPECT_FALSE(stands_alone(resampling, delay(80.0, 0.70)));
+  EXPECT_FALSE(stands_alone(resampling, alone(80.0, 0.70)));
 }
 
 }  // namespace

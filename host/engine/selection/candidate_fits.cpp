@@ -233,6 +233,10 @@ bool passes(const CandidateFit& t) {
   return t.admissible && t.score() > kPolicy.named_score && explained_percent(t) > kPolicy.named_chi2_percent;
 }
 
+bool explains_a_part(const CandidateFit& candidate) {
+  return candidate.gain.score > kPolicy.named_score && candidate.gain.chi2_percent >= 100.0 * kPolicy.line_share;
+}
+
 bool is_worth_a_term(const BalanceSearch& search, const CandidateFit& candidate) {
   const double noise = search.floor.value_or(0.0) / std::max(search.base.rmse_cv_fixed_effects(), 1e-300);
   return passes(candidate) &&

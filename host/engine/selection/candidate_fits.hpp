@@ -27,7 +27,8 @@ struct CandidateFit {
   std::string note;             // a remark for the user if it is named
   // Error on experiments that are held out, with it over without it; of the best one that passes alone.
   std::optional<double> held_out_ratio;
-  bool leads = false;  // has a higher score than a simpler one that comes first, but not significantly
+  bool shows_held_out = true;  // its torque there is large enough to take off the share of an effect that matters
+  bool leads = false;          // has a higher score than a simpler one that comes first, but not significantly
   bool order_is_not_identifiable =
       false;  // not admissible for this reason only: it has the usual order, which is the best of those tried
   bool has_uncertain_period = false;  // is a wave of the output's angle, and the data do not show its period
@@ -44,6 +45,8 @@ bool passes(const CandidateFit& candidate);
 // Whether it also takes the share off the left-out squares above the noise that a term has to; off all of them where
 // the noise is not known.
 bool is_worth_a_term(const BalanceSearch& search, const CandidateFit& candidate);
+// Whether its likelihood is significant, admissible or not, and it takes the share of a term off all left-out squares.
+bool explains_a_part(const CandidateFit& candidate);
 // Refuses those that would be named and are not worth it, best first. The list stays best first.
 void check_worth(const BalanceSearch& search, std::vector<CandidateFit>& candidates);
 

@@ -105,6 +105,8 @@ std::optional<Evidence> evidence(BalanceSearch& search, const CandidateFit& cand
   return std::nullopt;
 }
 
+}  // namespace
+
 EffectSize size_of(const BalanceSearch& search, const Eigen::VectorXd& own, const model::Drive& drive) {
   const Eigen::VectorXd& weights = search.base.root_weights;
   EffectSize size;
@@ -121,8 +123,6 @@ EffectSize size_of(const BalanceSearch& search, const Eigen::VectorXd& own, cons
     size.percent_of_rated = 100.0 * size.rms * gear / *rated;
   return size;
 }
-
-}  // namespace
 
 ConfoundingReason compare_with_model(BalanceSearch& search, const CandidateFit& candidate) {
   const RegressionProblem& data = *search.data;
@@ -165,7 +165,7 @@ void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candi
   };
   for (Candidate& c : result.candidates)
     for (const NamedEffect& n : result.named) {
-      if (c.effect != n.effect || c.order != n.order || candidate_of(n) == candidates.end()) continue;
+      if (c.is_lag || c.effect != n.effect || c.order != n.order || candidate_of(n) == candidates.end()) continue;
       c.evidence = evidence(search, *candidate_of(n), drive.axis);
       const Eigen::VectorXd own = own_torque(search, *candidate_of(n), search.base.root_weights);
       c.size = size_of(search, own, drive);

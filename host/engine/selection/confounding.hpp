@@ -22,9 +22,13 @@ bool is_scale_confounded(const BalanceSearch& search, const CandidateFit& first,
 // no wider form of the same law.
 bool is_angle_confounded(const CandidateFit& first, const CandidateFit& second);
 
+// How large a torque is on the samples of the fit. `own`: what the model cannot replace of it, N m (N on a linear
+// axis).
+EffectSize size_of(const BalanceSearch& search, const Eigen::VectorXd& own, const model::Drive& drive);
+
 // For each named effect, where it shows and how large its torque is; for effects that are named together, how similar
 // they are in these data: what of the torque of each, orthogonal to the model, is orthogonal to the model with the
-// other as well, and over which variable they do the same.
+// other as well, and over which variable they do the same. Not for a delay that is described by its lag.
 void explain_named(BalanceSearch& search, const std::vector<CandidateFit>& candidates, const model::Drive& drive,
                    Diagnosis& result);
 

@@ -89,7 +89,7 @@ bool unseen_by_halves_takes_off_nearly_all(const BothMethods& b) {
 }
 
 bool unseen_by_halves_stands_alone(const BothMethods& b) {
-  return !support(b) && stands_alone(b.resampling, likeliest(b));
+  return !support(b) && stands_alone(b.resampling, b.motor.candidates);
 }
 
 bool halves_found_others_only(const BothMethods& b) {
@@ -104,7 +104,7 @@ bool halves_name_several(const BothMethods& b) {
 }
 
 bool halves_did_not_choose_likeliest(const BothMethods& b) {
-  const bool most_abstained = b.resampling.abstained > kPolicy.most_abstaining * b.resampling.subsamples;
+  const bool most_abstained = b.resampling.abstained > kPolicy.most_abstaining_to_judge * b.resampling.subsamples;
   return !most_abstained && support(b) && *support(b) < kPolicy.named_frequency;
 }
 
@@ -157,15 +157,12 @@ Method deciding_method(const Resampling& resampling, const SearchedBalance& moto
   return std::ranges::find_if(kRules, [&](const DecidingRule& rule) { return rule.applies(both); })->decides;
 }
 
-bool stands_alone(const Resampling& resampling, const CandidateFit& likeliest) {
-  if (!resampling.found.empty()) return false;
-  // A lag is in the model that a delay is compared with, so that the likelihood counts only what is more than a lag.
-  const bool is_lag = is_delay_of_current(*likeliest.model.entry) && resampling.lag_s.value_or(0.0) < 0.0 &&
-                      resampling.lag_share >= kPolicy.most_share;
-  const bool takes_off_most = likeliest.gain.chi2_percent >= 100.0 * kPolicy.most_share;
-  if (!likeliest.held_out_ratio) return is_lag && likeliest.gain.chi2_percent >= 100.0 * kPolicy.matters_share;
-  const double fall = 1.0 - *likeliest.held_out_ratio * *likeliest.held_out_ratio;
-  return (is_lag && fall >= kPolicy.most_share) || (takes_off_most && fall >= kPolicy.matters_share);
+bool stands_alone(const Resampling& resampling, std::span<const CandidateFit> candidates) {
+  const CandidateFit& likeliest = candidates.front();
+  if (!resampling.found.empty() || likeliest.gain.chi2_percent < 100.0 * kPolicy.most_share) return false;
+  if (likeliest.held_out_ratio && likeliest.shows_held_out)
+    return 1.0 - std::pow(*likeliest.held_out_ratio, 2) >= kPolicy.matters_share;
+  return std::ranges::none_of(candidates.subspan(1), explains_a_part);
 }
 
 }  // namespace flexspline::selection

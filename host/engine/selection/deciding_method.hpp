@@ -31,11 +31,10 @@ std::span<const DecidingRule> deciding_rules();
 
 Method deciding_method(const Resampling& resampling, const SearchedBalance& motor);
 
-// Whether the likeliest effect, which resampling cannot choose, takes off most of the squared error on data left out
-// and a part that matters of that on held-out experiments, while halves find nothing else; or it is a delay of the
-// current, and the effort leads the motion by a lag that explains most of what is above the noise, as it does of the
-// squared error on held-out experiments, or, where there are none, the delay takes off a part that matters on data left
-// out.
-bool stands_alone(const Resampling& resampling, const CandidateFit& likeliest);
+// Whether the likeliest effect, which resampling cannot choose, takes off most of the squared error on data left out,
+// while halves find nothing else; and a part that matters of that on held-out experiments, or, where none
+// are held out or they cannot show it (a limit that they do not reach), no other effect explains any part of the error.
+// Needs one candidate or more, best first.
+bool stands_alone(const Resampling& resampling, std::span<const CandidateFit> candidates);
 
 }  // namespace flexspline::selection

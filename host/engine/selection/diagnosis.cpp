@@ -20,6 +20,7 @@
 #include "host/engine/selection/group_members.hpp"
 #include "host/engine/selection/held_out.hpp"
 #include "host/engine/selection/named_by_resampling.hpp"
+#include "host/engine/selection/named_delay.hpp"
 #include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/other_balance_evidence.hpp"
 #include "host/engine/selection/output_angle_period.hpp"
@@ -183,7 +184,7 @@ ChosenBalance choose_balance(std::vector<SearchedBalance>& all, const estimation
 
 // Names what the chosen balance lacks. Returns the candidate that likelihood named; null: it named none.
 const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const ChosenBalance& chosen, const Options& options,
-                                 data::Axis axis, Diagnosis& result) {
+                                 const model::Drive& drive, Diagnosis& result) {
   SearchedBalance& balance = *chosen.balance;
   const bool by_resampling = chosen.method == Method::resampling;
   std::string alias;
@@ -197,9 +198,10 @@ const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const Chosen
   const CrossValidatedFit& fit = balance.search.base;
   result.localised =
       shares(*balance.search.data, fit, by_likelihood || by_resampling ? fit.residual_fixed_effects() : fit.residual);
-  list_candidates(all, axis, result);
+  list_candidates(all, drive.axis, result);
   if (by_resampling) name_stable(balance, result);
   if (by_likelihood) name_by_likelihood(balance, alias, result);
+  if (chosen.balance == chosen.motor) name_delay(balance, drive, result);
   // Presliding has its travel and its errors after refit_presliding alone.
   take_back_insignificant(result, false);
   return by_likelihood ? &balance.candidates.front() : nullptr;
@@ -292,7 +294,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
     if (const auto own = inertia_by_record(*base, chosen.motor->search)) result.warnings.push_back(inertia_text(*own));
   SearchedBalance& balance = *chosen.balance;
   const bool by_resampling = chosen.method == Method::resampling;
-  const CandidateFit* likeliest = name_effects(all, chosen, options, model.drive.axis, result);
+  const CandidateFit* likeliest = name_effects(all, chosen, options, model.drive, result);
 
   const bool tests_between_records =
       chosen.motor_method == Method::resampling && (by_resampling || result.named.empty());
@@ -311,6 +313,7 @@ Diagnosis diagnose_at(const data::Dataset& dataset, const model::Model& model, c
   if (tests_between_records) look_between_records(*base, of_all_records, chosen, result);
   name_on_other_balances(all, *result.balance == estimation::Balance::motor ? *chosen.motor : balance, model.drive,
                          result);
+  list_waves_of_uncertain_period(all, result);
   refit_presliding(dataset, model, options, chosen.motor, result);
   take_back_insignificant(result);
   take_back_where_refit_holds_zero(dataset, model, options.pipeline, result);

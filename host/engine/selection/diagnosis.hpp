@@ -86,6 +86,7 @@ struct Candidate {
   // Of presliding: what all samples, those around reversals among them, say against it. Nothing where they were not
   // asked; empty where nothing does.
   std::optional<std::string> presliding_doubt;
+  bool is_lag = false;  // values, errors, score and size are those of the lag that every model has as a column
   // What on this drive makes its order, and which fact of the drive would tell more.
   std::vector<catalogue::OrderCause> order_causes;
   std::string order_hint;
@@ -144,7 +145,6 @@ struct Resampling {
   double von_neumann_ratio = 0.0;
   double lowest_hz = 0.0, highest_hz = 0.0;
   std::optional<double> lag_s, lag_std_s;  // of the effort's time base, taken off; nothing: not significant
-  double lag_share = 0.0;                  // of the squares above the noise that taking it off removes
   std::vector<FoundTerm> found;            // largest share first
   std::vector<std::string> not_visible;    // effects that these data could not show to resampling
   std::vector<FoundTerm> undecided;        // in the catalogue; neither found nor ruled out

@@ -229,10 +229,11 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
   ForwardStep at(table, fit, validation, noise, policy);
   const double before = at.now().validation_squares;
   result.before = result.after = before;
-  if (before / validation.rows > policy.max_validation_to_training * at.now().training_squares / fit.rows) {
-    result.abstains = true;
-    return result;
-  }
+  const auto carries_over = [&] {
+    return at.now().validation_squares / validation.rows <=
+           policy.max_validation_to_training * at.now().training_squares / fit.rows;
+  };
+  const bool base_carries_over = carries_over();
   at.set_floor(std::min(noise.variance * validation.rows, 0.999 * before));
   const double excess = before - at.floor();
   if (excess < policy.least_excess * before) {
@@ -252,6 +253,12 @@ SelectionPath select_forward(const RegressorTable& table, const HalfData& fit, c
     at.take(chosen);
     result.after = at.now().validation_squares;
     if (result.after - at.floor() < policy.least_excess * result.after) break;
+  }
+  // What a term takes off a model that does not hold on other data is extrapolation, unless it holds with the term.
+  if (!base_carries_over && !carries_over()) {
+    result.steps.clear();
+    result.after = before;
+    result.abstains = true;
   }
   return result;
 }

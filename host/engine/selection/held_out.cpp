@@ -10,6 +10,14 @@
 
 namespace flexspline::selection {
 
+namespace {
+
+double root_mean_square(const Eigen::VectorXd& x) {
+  return x.size() > 0 ? std::sqrt(x.squaredNorm() / static_cast<double>(x.size())) : 0.0;
+}
+
+}  // namespace
+
 HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification& fitted, estimation::Balance balance,
                  const estimation::PreparedData* ready) {
   for (const data::Experiment& e : dataset.experiments)
@@ -24,14 +32,24 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
 }
 
 double HeldOut::rmse(const Terms& terms) const {
-  estimation::PreparedData own;
   std::optional<RegressionProblem> with_load;
-  if (!prepared.output_signals.torque) {
-    own = prepared;
-    if (estimation::take_torque_where_read(own, terms)) with_load.emplace(own, data->balance());
-  }
-  const Eigen::VectorXd residual = (with_load ? *with_load : *data).residual(terms);
-  return residual.size() > 0 ? std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())) : 0.0;
+  estimation::PreparedData own;
+  return root_mean_square(data_for(terms, own, with_load).residual(terms));
+}
+
+double HeldOut::rms_torque(const Terms& terms, std::size_t term) const {
+  std::optional<RegressionProblem> with_load;
+  estimation::PreparedData own;
+  return root_mean_square(data_for(terms, own, with_load).term_torque(terms, term));
+}
+
+// Where no torque is measured, a law of it reads that of the load.
+const RegressionProblem& HeldOut::data_for(const Terms& terms, estimation::PreparedData& own,
+                                           std::optional<RegressionProblem>& with_load) const {
+  if (prepared.output_signals.torque) return *data;
+  own = prepared;
+  if (!estimation::take_torque_where_read(own, terms)) return *data;
+  return with_load.emplace(own, data->balance());
 }
 
 namespace {
@@ -54,6 +72,8 @@ void check_on_held_out(const HeldOut& held_out, const BalanceSearch& search, std
     CandidateFit& first = candidates.front();
     const double ratio = held_out.rmse(first.fit.terms) / std::max(before, 1e-300);
     first.held_out_ratio = ratio;
+    first.shows_held_out = std::pow(held_out.rms_torque(first.fit.terms, first.fit.terms.size() - 1), 2) >=
+                           kPolicy.matters_share * before * before;
     if (ratio * ratio <= most_growth(search.base, first.fit)) return;
     first.why_not =
         fmt::format("the error on experiments that are held out rises by {:.1f} % with it", 100.0 * (ratio - 1.0));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "host/engine/estimation/identify.hpp"
@@ -21,6 +22,12 @@ struct HeldOut {
 
   // Root mean square, N m, of what a model leaves with the values in `terms`. Needs `data`.
   double rmse(const Terms& terms) const;
+  // That of the torque of one of the terms, N m. Needs `data`.
+  double rms_torque(const Terms& terms, std::size_t term) const;
+
+ private:
+  const RegressionProblem& data_for(const Terms& terms, estimation::PreparedData& own,
+                                    std::optional<RegressionProblem>& with_load) const;
 };
 
 // Refuses candidates of the motor balance that would be named and that held-out data contradict, best first, until they

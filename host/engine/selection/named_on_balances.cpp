@@ -182,4 +182,16 @@ void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBal
   put_first(result);
 }
 
+void list_waves_of_uncertain_period(const std::vector<SearchedBalance>& all, Diagnosis& result) {
+  for (const SearchedBalance& balance : all)
+    for (const CandidateFit& candidate : balance.candidates) {
+      const NamedEffect name = name_of(candidate);
+      const bool is_listed =
+          contains(result.named, name) ||
+          std::ranges::any_of(result.possible, [&](const PossibleEffect& p) { return contains(p.group, name); });
+      if (candidate.has_uncertain_period && explains_a_part(candidate) && !is_listed)
+        result.possible.push_back({{name}, candidate.why_not, std::nullopt, std::nullopt});
+    }
+}
+
 }  // namespace flexspline::selection

@@ -20,4 +20,8 @@ void name_by_likelihood(const SearchedBalance& chosen, const std::string& alias,
 void name_on_other_balances(std::vector<SearchedBalance>& all, const SearchedBalance& chosen, const model::Drive& drive,
                             Diagnosis& result);
 
+// Waves of the output's angle that explain a part of a balance's error, and that are not named as the data do not show
+// their period, are possible.
+void list_waves_of_uncertain_period(const std::vector<SearchedBalance>& all, Diagnosis& result);
+
 }  // namespace flexspline::selection

@@ -179,12 +179,13 @@ std::string is_too_small_behind_another(const FoundOnMotor& e) {
       e.found.share_percent, 100.0 * kPolicy.line_share);
 }
 
-// A name that is not certain may be what the first law leaves: held-out experiments decide.
-bool is_certain_behind_another(const FoundOnMotor& e) {
-  return e.named_before.empty() || e.found.frequency >= kPolicy.certain_frequency || !e.found.held_out_ratio ||
-         e.found.is_confirmed();
+// A name that is not certain may be what another law leaves, or an imperfection that is in no catalogue: held-out
+// experiments decide, where there are any.
+bool is_certain(const FoundOnMotor& e) {
+  const double least = e.named_before.empty() ? kPolicy.unconfirmed_frequency : kPolicy.certain_frequency;
+  return e.found.frequency >= least || !e.found.held_out_ratio || e.found.is_confirmed();
 }
-std::string is_not_certain_behind_another(const FoundOnMotor& e) {
+std::string is_not_certain(const FoundOnMotor& e) {
   return how_held_out_falls(e.found);
 }
 
@@ -200,7 +201,7 @@ constexpr auto kRules = std::to_array<NamingRule>({
     {"not behind a group that the data cannot distinguish", is_not_behind_group, is_behind_group},
     {"behind another: a single effect", is_single_behind_another, is_group_behind_another},
     {"behind another: the share of a term", matters_behind_another, is_too_small_behind_another},
-    {"behind another: certain, or held-out error", is_certain_behind_another, is_not_certain_behind_another},
+    {"certain, or held-out error", is_certain, is_not_certain},
 });
 
 }  // namespace

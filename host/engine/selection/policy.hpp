@@ -54,7 +54,8 @@ struct SelectionPolicy {
   double named_frequency = 0.6;       // Meinshausen and Buehlmann 2010: 0.6 to 0.9
   double min_frequency_of_all = 0.5;  // with abstaining subsamples counted as not choosing: the least that Meinshausen
                                       // and Buehlmann's bound of false selections allows
-  double certain_frequency = 0.9;     // behind a structure that is in no catalogue
+  double unconfirmed_frequency = 0.75;  // where held-out experiments do not confirm it: the middle of that range
+  double certain_frequency = 0.9;       // behind a structure that is in no catalogue
 
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.
   double line_share = 0.05;  // a linear term
@@ -76,6 +77,8 @@ struct SelectionPolicy {
                                      // was chosen first is not behind a structure that is in no catalogue
   double least_own_frequency = 0.3;  // of the first of a group
   double most_abstaining = 0.75;     // of the subsamples
+  // Of the subsamples: where more abstain, halves do not judge what likelihood names, as no majority can choose it.
+  double most_abstaining_to_judge = 0.5;
 
   // Squared error per sample of the half that validates over that of the half that fits: above, the model itself does
   // not hold on other data.
@@ -95,6 +98,8 @@ struct SelectionPolicy {
   // Share of the squared error on experiments that are held out: a term that takes off so much there matters, and needs
   // no more than the usual share of the subsamples, whatever else is missing.
   double matters_share = 0.2;
+  // RMS error without a large effect over that with it, the noise in both.
+  double large_rise = 1.2;
   // Most of it. What takes off so much needs no majority of the subsamples, only none against it; and a wave of the
   // output's angle whose likelihood is not significant needs as much: over a part of a turn it takes off a part of any
   // slow function of the angle (by hand, robot-like twins).
@@ -130,6 +135,9 @@ struct SelectionPolicy {
   // catalogue has, and a quarter more.
   int usual_lag_rows = 4;
   double longest_lag_s = 0.025;
+  // From so many samples on a lag is a delay of the current: by half a sample a held effort may be aligned wrongly, by
+  // one the order in which a logger reads its columns.
+  double least_delay_samples = 1.5;
 
   // Resampling against likelihood on the motor's balance.
   // Percent of the left-out chi-square from which on what resampling cannot choose counts by itself: what was named

@@ -7,6 +7,7 @@
 
 #include "host/engine/selection/balance_errors.hpp"
 #include "host/engine/selection/effect_names.hpp"
+#include "host/engine/selection/named_delay.hpp"
 
 namespace flexspline::selection {
 namespace {
@@ -76,8 +77,11 @@ void assess_verdict(const SearchedBalance& chosen, const CrossValidatedFit& afte
     const auto above = [&](const CrossValidatedFit& j) {
       return j.rmse() * j.rmse() - *result.noise_floor * *result.noise_floor;
     };
-    if (above(chosen.search.base) > 0.0)
-      result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / above(chosen.search.base)), 0.0, 100.0);
+    double before = above(chosen.search.base);
+    // A delay that is named by its lag: the base model has that lag.
+    if (!result.candidates.empty() && result.candidates.front().is_lag)
+      before += std::pow(chosen.search.base.rmse(), 2) * (1.0 / (1.0 - lag_of(chosen.search.base).share) - 1.0);
+    if (before > 0.0) result.recovered_percent = std::clamp(100.0 * (1.0 - above(after) / before), 0.0, 100.0);
     enough = at_floor || result.recovered_percent.value_or(100.0) >= kPolicy.recovered_percent;
   }
   const std::vector<LocalisedResidual> remaining =

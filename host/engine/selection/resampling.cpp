@@ -132,7 +132,6 @@ Resampling resample(const std::vector<const data::Experiment*>& experiments, con
     selection.correct_lag(*lag);
     result.lag_s = lag->lag_s;
     result.lag_std_s = lag->std_s;
-    result.lag_share = lag->reduction_share;
   }
   result.torque_has_noise = selection.tables().torque_has_noise;
   result.highest_hz = selection.tables().bandwidth.highest_hz;

@@ -10,7 +10,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection::selection_joint_names_test {
+namespace flexspline::selection::joint_names_test {
 namespace {
 
 using data::Column;
@@ -56,7 +56,11 @@ class NamesTogether : public ::testing::Test {
   }
   static Resampling found(const std::vector<NamedEffect>& names) {
     Resampling resampling;
-    for (const NamedEffect& n : names) resampling.found.push_back({.group = {n}, .frequency = 0.8});
+    for (const NamedEffect& n : names) {
+      Resampling::FoundTerm& one = resampling.found.emplace_back();
+      one.group = {n};
+      one.frequency = 0.8;
+    }
     return resampling;
   }
   static std::vector<std::string> effects(const std::vector<NamedEffect>& names) {
@@ -118,4 +122,4 @@ TEST_F(NamesTogether, PreslidingIsNotJudgedAndASingleNameStays) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection::selection_joint_names_test
+}  // namespace flexspline::selection::joint_names_test

@@ -9,7 +9,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection::selection_untried_effects_test {
+namespace flexspline::selection::untried_effects_test {
 namespace {
 
 using data::Column;
@@ -38,4 +38,4 @@ TEST(UntriedEffects, AreThoseOfTheCurrentWhereTheEffortIsATorqueAndMoreIsMissing
 }
 
 }  // namespace
-}  // namespace flexspline::selection::selection_untried_effects_test
+}  // namespace flexspline::selection::untried_effects_test

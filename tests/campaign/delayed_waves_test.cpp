@@ -12,7 +12,7 @@
 #include "tests/support/plain_model.hpp"
 #include "tests/support/written_experiment.hpp"
 
-namespace flexspline::selection::selection_delayed_waves_test {
+namespace flexspline::selection::delayed_waves_test {
 namespace {
 
 using data::Column;
@@ -74,4 +74,4 @@ TEST(DelayedWaves, FollowARippleThatIsLateBetterThanOneThatIsNot) {
 }
 
 }  // namespace
-}  // namespace flexspline::selection::selection_delayed_waves_test
+}  // namespace flexspline::selection::delayed_waves_test
