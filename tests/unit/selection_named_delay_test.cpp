@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "host/engine/estimation/effort_timing.hpp"
 #include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/selection/named_delay.hpp"
 #include "host/engine/selection/policy.hpp"
@@ -81,6 +82,15 @@ TEST(NamedDelay, IsNotNamedWhereNoiseHidesIt) {
 
 TEST(NamedDelay, IsNotNamedWhereExperimentsThatAreHeldOutContradict) {
   EXPECT_FALSE(is_named(10e-3, 0.02, -10e-3));
+}
+
+// Its slope is the lag's column: the interval of the delay would hold anything.
+TEST(NamedDelay, InTheModelLeavesNoLagToWidenItsInterval) {
+  const data::Dataset dataset = tests::recorded_with_delay(8e-3, 0.2, 8e-3);
+  model::Model model = tests::model_of_delayed_axis();
+  EXPECT_TRUE(estimation::effort_lag(*estimation::identify(dataset, model, {})));
+  model.effects.push_back(catalogue::blank_effect(catalogue::get("current_delay"), data::Axis::rotary));
+  EXPECT_FALSE(estimation::effort_lag(*estimation::identify(dataset, model, {})));
 }
 
 }  // namespace

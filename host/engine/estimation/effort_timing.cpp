@@ -60,7 +60,9 @@ bool EffortLag::is_certain() const {
 
 std::optional<EffortLag> effort_lag(const Identification& found) {
   const auto motor = std::ranges::find(found.data, Balance::motor, &RegressionProblem::balance);
-  if (motor == found.data.end()) return std::nullopt;
+  const bool has_delay = std::ranges::any_of(
+      found.terms, [](const Term& t) { return t.entry->info->reads == effects::kCurrent && t.entry->has_state; });
+  if (motor == found.data.end() || has_delay) return std::nullopt;
   const auto b = static_cast<std::size_t>(motor - found.data.begin());
   const auto parameters = parameters_with_errors(found);
   if (parameters[b].empty()) return std::nullopt;

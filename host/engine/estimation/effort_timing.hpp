@@ -25,7 +25,7 @@ struct EffortLag {
 
 // The lag that the motor's balance shows, by least squares with one column more, the slope of the effort in time. A
 // change of an estimate is compared with the difference of the two variances (Hausman 1978). Nothing where no record
-// has an effort and a motion, or the slope is not independent of the model's columns.
+// has an effort and a motion, or the slope is not independent of the model's columns, as beside a delay of the current.
 //
 // Errors of the model that look like a lag (friction that comes later than the reversal) are counted for one.
 std::optional<EffortLag> effort_lag(const Identification& found);

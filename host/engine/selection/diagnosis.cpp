@@ -209,6 +209,12 @@ const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const Chosen
 
 // The delay of the effort that halves of the data agree on, and what to do about it.
 void assess_delay(const ChosenBalance& chosen, const estimation::PreparedData& prepared, Diagnosis& result) {
+  // Beside a delay of the model's own, a lag is not known.
+  if (std::ranges::any_of(chosen.balance->search.base.terms,
+                          [](const estimation::Term& t) { return is_delay_of_current(*t.entry); })) {
+    result.delay_s.reset();
+    return;
+  }
   if (chosen.method == Method::resampling && result.resampling->lag_s) result.delay_s = result.resampling->lag_s;
   if (!result.delay_s) return;
   result.delay_advice = delay_advice(*result.delay_s, prepared);
