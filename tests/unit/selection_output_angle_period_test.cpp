@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "host/engine/estimation/identify.hpp"
+#include "host/engine/selection/named_on_balances.hpp"
 #include "host/engine/selection/output_angle_period.hpp"
 #include "shared/fixed/turn.hpp"
 #include "tests/support/plain_model.hpp"
@@ -84,6 +85,22 @@ TEST(OutputAnglePeriod, IsUncertainOfARippleThatIsTheSameFunctionWithoutAGear) {
     EXPECT_TRUE(candidate.has_uncertain_period) << candidate.model.entry->name();
     EXPECT_FALSE(candidate.admissible);
   }
+}
+
+TEST(OutputAnglePeriod, WhereUncertainIsListedAsPossibleOnceIfThePartOfTheErrorIsATerms) {
+  std::vector<SearchedBalance> all(1);
+  all.front().candidates = weight_and_ripple(0.1, 1.0);
+  Diagnosis result;
+  result.named = {{"torque_ripple", 1.0}};
+  list_waves_of_uncertain_period(all, result);
+  list_waves_of_uncertain_period(all, result);
+  ASSERT_EQ(result.possible.size(), 1U);
+  EXPECT_EQ(result.possible.front().group.front().effect, "gravity");
+  EXPECT_FALSE(result.possible.front().why_not.empty());
+  for (CandidateFit& candidate : all.front().candidates) candidate.gain.chi2_percent = 100.0 * kPolicy.line_share - 0.1;
+  Diagnosis small;
+  list_waves_of_uncertain_period(all, small);
+  EXPECT_TRUE(small.possible.empty());
 }
 
 }  // namespace

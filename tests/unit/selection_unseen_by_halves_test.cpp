@@ -42,6 +42,14 @@ TEST(EffectThatHalvesCannotChoose, IsNotNamedWhereHeldOutDataDoNotConfirmIt) {
   EXPECT_FALSE(stands_alone(nothing_found(), alone(80.0, 0.90)));
 }
 
+// A limit of the current that they do not reach.
+TEST(EffectThatHalvesCannotChoose, IsNotJudgedByHeldOutDataThatCannotShowIt) {
+  std::vector<CandidateFit> candidates = alone(58.0, 0.996);
+  EXPECT_FALSE(stands_alone(nothing_found(), candidates));
+  candidates.front().shows_held_out = false;
+  EXPECT_TRUE(stands_alone(nothing_found(), candidates));
+}
+
 TEST(EffectThatHalvesCannotChoose, WithoutHeldOutDataNoOtherEffectMayExplainAnyPart) {
   std::vector<CandidateFit> candidates = alone(58.0, std::nullopt);
   EXPECT_TRUE(stands_alone(nothing_found(), candidates));

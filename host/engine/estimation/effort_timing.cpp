@@ -9,6 +9,7 @@
 #include "host/common/signals/interpolate.hpp"
 #include "host/engine/estimation/least_squares.hpp"
 #include "host/engine/estimation/linearised.hpp"
+#include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/estimation/zero_order_hold.hpp"
 
 namespace flexspline::estimation {
@@ -60,9 +61,7 @@ bool EffortLag::is_certain() const {
 
 std::optional<EffortLag> effort_lag(const Identification& found) {
   const auto motor = std::ranges::find(found.data, Balance::motor, &RegressionProblem::balance);
-  const bool has_delay = std::ranges::any_of(
-      found.terms, [](const Term& t) { return t.entry->info->reads == effects::kCurrent && t.entry->has_state; });
-  if (motor == found.data.end() || has_delay) return std::nullopt;
+  if (motor == found.data.end() || has_delay_of_current(found.terms)) return std::nullopt;
   const auto b = static_cast<std::size_t>(motor - found.data.begin());
   const auto parameters = parameters_with_errors(found);
   if (parameters[b].empty()) return std::nullopt;

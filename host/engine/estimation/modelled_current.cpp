@@ -24,6 +24,14 @@ bool reads_modelled_current(const Term& term) {
   return !term.entry->definition && (term.entry->has_state || is_nonlinear_in_current(term));
 }
 
+bool is_delay_of_current(const catalogue::Entry& entry) {
+  return entry.has_state && entry.info->reads == effects::kCurrent;
+}
+
+bool has_delay_of_current(const Terms& terms) {
+  return std::ranges::any_of(terms, [](const Term& t) { return is_delay_of_current(*t.entry); });
+}
+
 bool is_nonlinear_in_current(const Term& term) {
   return !term.entry->definition && term.entry->info->reads == effects::kCurrent &&
          term.entry->count(effects::Kind::linear) > 0;

@@ -13,6 +13,10 @@ bool reads_modelled_current(const Term& term);
 // Of these, the torque of a nonlinear function of the current, with a linear coefficient.
 bool is_nonlinear_in_current(const Term& term);
 
+// Whether an effect delays the current: it reads the current alone and has a state.
+bool is_delay_of_current(const catalogue::Entry& entry);
+bool has_delay_of_current(const Terms& terms);
+
 // Gives the records the current that `terms`, with values, make of motion and load, A, for effects with a memory of the
 // current, or nonlinear in it (RecordSignals::modelled_current). Nothing changes where a term has such a memory, or no
 // current is measured.

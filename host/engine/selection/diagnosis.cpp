@@ -210,8 +210,7 @@ const CandidateFit* name_effects(std::vector<SearchedBalance>& all, const Chosen
 // The delay of the effort that halves of the data agree on, and what to do about it.
 void assess_delay(const ChosenBalance& chosen, const estimation::PreparedData& prepared, Diagnosis& result) {
   // Beside a delay of the model's own, a lag is not known.
-  if (std::ranges::any_of(chosen.balance->search.base.terms,
-                          [](const estimation::Term& t) { return is_delay_of_current(*t.entry); })) {
+  if (estimation::has_delay_of_current(chosen.balance->search.base.terms)) {
     result.delay_s.reset();
     return;
   }

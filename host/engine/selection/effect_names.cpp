@@ -20,8 +20,4 @@ const CandidateFit* candidate_named(const SearchedBalance& balance, const NamedE
   return at == balance.candidates.end() ? nullptr : &*at;
 }
 
-bool is_delay_of_current(const catalogue::Entry& entry) {
-  return entry.has_state && entry.info->reads == effects::kCurrent;
-}
-
 }  // namespace flexspline::selection

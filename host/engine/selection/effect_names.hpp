@@ -39,7 +39,4 @@ inline bool contains_family(const std::vector<NamedEffect>& names, const Candida
 // The candidate of that name; null: there is none.
 const CandidateFit* candidate_named(const SearchedBalance& balance, const NamedEffect& name);
 
-// Whether an effect delays the current: it reads the current alone and has a state.
-bool is_delay_of_current(const catalogue::Entry& entry);
-
 }  // namespace flexspline::selection

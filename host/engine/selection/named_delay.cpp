@@ -5,6 +5,7 @@
 
 #include "host/common/numbers/distributions.hpp"
 #include "host/engine/estimation/model_projection.hpp"
+#include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/selection/confounding.hpp"
 #include "host/engine/selection/described_candidates.hpp"
 #include "host/engine/selection/effect_names.hpp"
@@ -52,6 +53,10 @@ void describe_by_lag(const SearchedBalance& motor, const Lag& lag, double more, 
   const CrossValidatedFit& base = motor.search.base;
   const Eigen::Index last = base.theta.size() - 1;
   delay.is_lag = true;
+  delay.note =
+      "Each model here has a lag of the effort, so that halves of the data do not choose a delay. Its value, its size "
+      "and "
+      "its error before are those of the lag; all other errors are with the lag in the model.";
   estimation::Estimate& value = delay.parameters.front();
   const effects::ParameterInfo& info = catalogue::get(delay.effect).parameters.front();
   // The best of all lags is not to first order. Without it, the delay is between the lag and the sum of both in the
@@ -94,7 +99,7 @@ void name_delay(const SearchedBalance& motor, const model::Drive& drive, Diagnos
   const bool is_unknown =
       result.resampling && std::ranges::any_of(result.resampling->found, &Resampling::FoundTerm::is_unknown_structure);
   if (!result.named.empty() || is_unknown) return;
-  const auto is_delay = [](const CandidateFit& c) { return is_delay_of_current(*c.model.entry); };
+  const auto is_delay = [](const CandidateFit& c) { return estimation::is_delay_of_current(*c.model.entry); };
   const auto delay = std::ranges::find_if(motor.candidates, is_delay);
   if (delay == motor.candidates.end()) return;
   const double least_s = kPolicy.least_delay_samples * longest_sample_s(motor);

@@ -54,7 +54,7 @@ struct SelectionPolicy {
   double named_frequency = 0.6;       // Meinshausen and Buehlmann 2010: 0.6 to 0.9
   double min_frequency_of_all = 0.5;  // with abstaining subsamples counted as not choosing: the least that Meinshausen
                                       // and Buehlmann's bound of false selections allows
-  double unconfirmed_frequency = 0.75;  // where held-out experiments do not confirm it: the middle of that range
+  double unconfirmed_frequency = 0.75;  // where held-out experiments do not confirm it (by hand, two logs)
   double certain_frequency = 0.9;       // behind a structure that is in no catalogue
 
   // Share of the squares above the noise that a term has to take off on samples that the fit did not see.

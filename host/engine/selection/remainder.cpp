@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/selection/balance_errors.hpp"
 #include "host/engine/selection/effect_names.hpp"
 #include "host/engine/selection/named_delay.hpp"
@@ -105,7 +106,7 @@ void assess_remainder(const SearchedBalance& chosen, Diagnosis& result) {
   // A missing effect may look like a delay, so the delay is taken from the better model. Where a delay is named, it
   // says how large it is.
   const bool names_delay = std::any_of(result.named.begin(), result.named.end(), [](const NamedEffect& n) {
-    return is_delay_of_current(catalogue::get(n.effect));
+    return estimation::is_delay_of_current(catalogue::get(n.effect));
   });
   const Eigen::Index delay = after.theta.size() - 1;
   if (chosen.search.data->balance() == estimation::Balance::motor && !names_delay &&
