@@ -136,5 +136,37 @@ TEST(NoisyTorsion, IsOneOfWhichTheMaskLeavesLessThanAFifthOfTheSquares) {
   EXPECT_FALSE(leaves_too_little(1.0));
 }
 
+// The noise of the torsion's rate where both positions have an error of their own and one that is common to them, as
+// time stamps make it; rad, at the output.
+double torsion_rate_noise(double common) {
+  constexpr double kOwn = 1e-6;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  data::Dataset dataset;
+  dataset.experiments.push_back(tests::written_experiment("free", 2e-3, 6000, [&](double t, data::Experiment& e) {
+    const double q = 0.4 * std::sin(0.5 * kTurn * t), of_both = common * noise(random);
+    e[Column::motor_position].push_back(kRatio * (q + of_both + kOwn * noise(random)));
+    e[Column::output_position].push_back(q + of_both + kOwn * noise(random));
+    e[Column::motor_torque].push_back(0.01 * std::cos(0.5 * kTurn * t));
+    e[Column::torque].push_back(0.1);
+  }));
+  dataset.drive.gear_ratio = kRatio;
+  PipelineOptions stated;
+  stated.cutoff_hz = 20.0;
+  const auto found = identify(dataset, tests::plain_model_with({"linear_stiffness"}), stated);
+  return found->prepared.records.front().velocity_noise[static_cast<std::size_t>(Balance::transmission)];
+}
+
+TEST(NoiseOfTheTorsion, IsNotWhatBothPositionsHaveInCommon) {
+  // White noise of the difference, differentiated behind a Butterworth filter of order five in both directions.
+  const double cutoff_hz = 20.0, step_hz = 0.01;
+  double power = 0.0;  // integral of the spectrum from zero to half the sample rate
+  for (double f = 0.5 * step_hz; f < 250.0; f += step_hz)
+    power += 2.0 * 2e-3 * step_hz * std::pow(kTurn * f / (1.0 + std::pow(f / cutoff_hz, 10)), 2);
+  const double expected = std::sqrt(2.0 * power) * 1e-6;
+  EXPECT_NEAR(torsion_rate_noise(0.0), expected, 0.05 * expected);
+  EXPECT_NEAR(torsion_rate_noise(1e-4), torsion_rate_noise(0.0), 0.05 * torsion_rate_noise(0.0));
+}
+
 }  // namespace
 }  // namespace flexspline::estimation::estimation_output_signals_test

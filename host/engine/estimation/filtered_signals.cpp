@@ -282,6 +282,21 @@ void take_torques(Record& r, const Experiment& e, const catalogue::DriveConstant
   }
 }
 
+// Noise of the torsion's rate. That of both positions together, or less: an error of the time stamps, and motion faster
+// than the filter, are in both positions and not in their difference.
+double torsion_rate_noise(const Experiment& e, const SideMotion& motor, const SideMotion& output, double gear_ratio,
+                          const ZeroPhaseFilter& filter) {
+  const double of_both = std::hypot(motor.velocity_noise / gear_ratio, output.velocity_noise);
+  if (!e.has(Column::motor_position) || !e.has(Column::output_position)) return of_both;
+  std::vector<double> torsion = e[Column::motor_position];
+  for (std::size_t k = 0; k < torsion.size(); ++k) torsion[k] = torsion[k] / gear_ratio - e[Column::output_position][k];
+  const double of_steps =
+      std::hypot(motor.quantum.value_or(0.0) / gear_ratio, output.quantum.value_or(0.0)) / std::sqrt(12.0);
+  const double noise =
+      std::max(of_steps, white_noise_of(torsion, filtered(torsion, e.segments, filter), filter, e.sample_s));
+  return std::min(of_both, noise * derivative_noise_gain(filter, e.sample_s));
+}
+
 // Motion of both sides, the noise of their directions, and whether the drive is off.
 void take_motion(Record& r, const Experiment& e, const PreparedData& prepared, const ZeroPhaseFilter& filter,
                  Derivatives derivatives) {
@@ -307,7 +322,7 @@ void take_motion(Record& r, const Experiment& e, const PreparedData& prepared, c
   r.velocity_noise[index(Balance::load)] =
       r.has_output_motion && output.velocity_noise > 0.0 ? output.velocity_noise : motor.velocity_noise / gear_ratio;
   r.velocity_noise[index(Balance::transmission)] =
-      std::hypot(motor.velocity_noise / gear_ratio, r.locked ? 0.0 : output.velocity_noise);
+      r.locked ? motor.velocity_noise / gear_ratio : torsion_rate_noise(e, motor, output, gear_ratio, filter);
   if (r.has_motor_motion) {
     const std::vector<double>& p = e.has(Column::motor_position) ? e[Column::motor_position] : motor.position;
     const auto [low, high] = std::minmax_element(p.begin(), p.end());
