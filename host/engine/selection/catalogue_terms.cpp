@@ -270,14 +270,17 @@ Eigen::MatrixXd basis_of_model(const TableBuilder& builder, const Eigen::VectorX
   return algebra::PivotedQr(all, 1e-7).span();
 }
 
-// What the model leaves of all data that are fitted.
+// What the model leaves of all data that are fitted, in motion: while an axis sticks its friction takes any value, and
+// a wave over the angle, which is constant there, would take that off.
 class LeftByModel {
  public:
   explicit LeftByModel(const TableBuilder& builder) {
     const RegressorTable& table = builder.table;
     fitted_on_ = Eigen::VectorXd::Zero(table.target.size());
     for (const Run& run : table.runs)
-      if (table.held_out[run.record] == 0) fitted_on_.segment(run.first, run.last - run.first).setOnes();
+      if (table.held_out[run.record] == 0)
+        for (Eigen::Index k = run.first; k < run.last; ++k)
+          fitted_on_[k] = std::abs(table.velocity_over_noise[k]) > builder.policy.visible_velocity ? 1.0 : 0.0;
     basis_ = basis_of_model(builder, fitted_on_);
     residual_ = orthogonal(table.target);
   }

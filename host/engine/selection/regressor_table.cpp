@@ -198,12 +198,12 @@ RegressorTable make_regressor_table(const PreparedData& prepared, Balance balanc
   TableBuilder builder{sign, presliding ? &*presliding : nullptr, terms, policy, table, {}, {}, {}};
   if (!add_model_columns(builder)) return table;
   const Motion motion = motion_of(prepared);
+  add_row_signals(builder);
   add_catalogue_terms(builder, motion);
   add_generic_curves(builder, motion);
   if (travels) add_presliding_shape(builder, *travels);
   add_other_travels(builder);
   add_differences(builder);
-  add_row_signals(builder);
   scale_columns(builder);
   return table;
 }
