@@ -2,6 +2,9 @@
 // show that it is one.
 #include <gtest/gtest.h>
 
+#include <utility>
+#include <vector>
+
 #include "host/engine/selection/naming_rules.hpp"
 #include "host/engine/selection/policy.hpp"
 
@@ -20,17 +23,25 @@ SearchedBalance balance(std::string_view effect, double score, double percent) {
   return motor;
 }
 
-// All subsamples chose it, or could not distinguish it from `other`.
-bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio, double percent = 10.0,
-               std::string_view other = {}) {
+// All subsamples chose these; the candidate is the first of them.
+bool is_stated_of(const std::vector<NamedEffect>& group, double score, std::optional<double> held_out_ratio,
+                  double percent) {
   Resampling resampling;
   resampling.subsamples = 100.0;
   Resampling::FoundTerm found;
-  found.group = {{std::string(effect), std::nullopt}};
-  if (!other.empty()) found.group.push_back({std::string(other), 1.0});
+  found.group = group;
   found.frequency = 1.0;
   found.held_out_ratio = held_out_ratio;
-  return may_be_stated(resampling, found, balance(effect, score, percent));
+  SearchedBalance motor = balance(group.front().effect, score, percent);
+  motor.candidates.front().model.order = group.front().order;
+  return may_be_stated(resampling, found, motor);
+}
+// All subsamples chose it, or could not distinguish it from `other`.
+bool is_stated(std::string_view effect, double score, std::optional<double> held_out_ratio, double percent = 10.0,
+               std::string_view other = {}) {
+  std::vector<NamedEffect> group = {{std::string(effect), std::nullopt}};
+  if (!other.empty()) group.push_back({std::string(other), 1.0});
+  return is_stated_of(group, score, held_out_ratio, percent);
 }
 
 TEST(OutputAngle, AnEffectOfItNeedsALikelihoodThatIsSignificant) {
@@ -47,6 +58,12 @@ TEST(OutputAngle, ASmallEffectIsNotStatedWhereTheNoiseIsNotKnown) {
 TEST(OutputAngle, OrHalfOfTheSquaredHeldOutError) {
   EXPECT_TRUE(is_stated("gravity", 0.0, 0.70));
   EXPECT_FALSE(is_stated("gravity", 0.0, 0.71));
+}
+
+TEST(OutputAngle, FrictionOverATurnOfTheOutputNeedsAsMuchAndOverOneOfTheMotorDoesNot) {
+  for (const auto& [order, is_enough] : {std::pair{0.02, false}, {1.0, true}})
+    EXPECT_EQ(is_stated_of({{"angle_dependent_friction", order}}, kPolicy.named_score + 30.0, 0.97, 2.6), is_enough);
+  EXPECT_TRUE(is_stated_of({{"angle_dependent_friction", 0.02}}, kPolicy.named_score + 30.0, 0.97, 5.1));
 }
 
 TEST(OutputAngle, OtherEffectsAreStatedByTheirFrequencyAlone) {

@@ -21,10 +21,10 @@ bool is_significant(const SearchedBalance& motor, const NamedEffect& name) {
   });
 }
 
-// Whether an effect is a wave of the output's angle. Over a part of a turn that is an offset and a slope, which halves
-// choose for any slow function of the angle.
+// Whether an effect is a wave of the output's angle, or of fewer than one a turn of the motor. Over a part of a turn
+// that is an offset and a slope, which halves choose for any slow function of the angle.
 bool is_of_output_angle(const NamedEffect& name) {
-  return (catalogue::get(name.effect).info->reads & effects::kOutputAngle) != 0;
+  return (catalogue::get(name.effect).info->reads & effects::kOutputAngle) != 0 || name.order.value_or(1.0) < 1.0;
 }
 
 // The candidate of a single effect that was found, of those that likelihood can judge: it leaves out reversals, where
