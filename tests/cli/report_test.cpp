@@ -108,6 +108,19 @@ TEST_F(Report, OfDiagnoseHoldsTheCandidates) {
   EXPECT_TRUE(contains(document["verdict"].get<std::string>(), "viscous_asymmetry"));
 }
 
+TEST_F(Report, OfDiagnoseHasTheSentencesOfTheTerminal) {
+  const std::string line = std::string("flexspline diagnose --model demo-out/base-model.toml ") + kData;
+  const nlohmann::json round = page_of(line, "d.html")["rounds"][0];
+  std::string terminal = shell_.must(line);
+  for (std::size_t at = 0; (at = terminal.find("\n  ", at)) != std::string::npos;) terminal.replace(at, 3, " ");
+  EXPECT_TRUE(contains(terminal, round["error_in_words"].get<std::string>())) << terminal;
+  ASSERT_FALSE(round["sizes"].empty());
+  ASSERT_FALSE(round["certainty"].empty());
+  for (const char* sentences : {"sizes", "certainty", "possible_in_words"})
+    for (const nlohmann::json& sentence : round[sentences])
+      EXPECT_TRUE(contains(terminal, sentence.get<std::string>())) << sentence << "\n" << terminal;
+}
+
 TEST_F(Report, OfAddShowsTheErrorBeforeAndAfter) {
   const nlohmann::json document = page_of(
       std::string("flexspline add viscous_asymmetry --model fitted.toml ") + kData + " --out better.toml --json a.json",

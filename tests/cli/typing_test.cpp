@@ -40,6 +40,25 @@ TEST(Typing, AMisspeltOptionNamesTheOneThatWasMeant) {
   }
 }
 
+TEST(Typing, ACommandByTheWordOfAnotherToolNamesOurs) {
+  const Shell shell;
+  for (const auto& [word, ours] : {std::pair{"explain dahl_friction", "effects"}, {"fit data.csv", "identify"}}) {
+    const Answer answer = shell.run(std::string("flexspline ") + word);
+    EXPECT_EQ(answer.code, 2);
+    EXPECT_TRUE(contains(answer.err, std::string("did you mean ") + ours + "?")) << answer.err;
+  }
+}
+
+TEST(Typing, AValueWithAUnitIsAnsweredWithWhatTheOptionTakes) {
+  const Shell shell;
+  shell.write("data.csv", "time_s,current_a\n0,1\n");
+  const Answer answer = shell.run("flexspline identify data.csv --model model.toml --cutoff-hz 5kHz");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_TRUE(
+      contains(answer.err, "--cutoff-hz takes a number without a unit, as 5000 or 0.05, and \"5kHz\" was given"))
+      << answer.err;
+}
+
 TEST(Typing, AMisspeltEffectNamesTheOneThatWasMeant) {
   const Shell shell;
   shell.write("model.toml", "format = \"flexspline-model/1\"\n[[effect]]\ntype = \"inertia\"\n");

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/engine/selection/add_until_complete.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 
 namespace flexspline::output::output_diagnosis_test {
 namespace {

@@ -93,6 +93,41 @@ TEST(DiagnosisText, HasTheTimesOfDisturbancesAfterTheFirstSampleWhereTheColumnIs
   EXPECT_FALSE(contains(plain, "after the first sample"));
 }
 
+TEST(DiagnosisText, SaysHowCertainANameIsByTheMethodThatDecided) {
+  Diagnosis d = with_ripple(0.1, 10.0);
+  d.candidates.front().score = 347.2;
+  EXPECT_TRUE(contains(unwrapped(text_of(d)),
+                       "Score 347.2 for torque_ripple (2 per turn); a name needs 19.5, which one of 1000 simulated "
+                       "drives passes where nothing is missing."));
+  d.resampling.emplace();
+  d.resampling->decides = true;
+  d.resampling->subsamples = 84.0;
+  d.resampling->lowest_hz = 5.0;
+  d.resampling->highest_hz = 20.0;
+  const std::string resampled = unwrapped(text_of(d));
+  EXPECT_FALSE(contains(resampled, "Score 347")) << resampled;
+  EXPECT_TRUE(contains(resampled, "84 halves of the data, low-pass filters from 5 to 20 Hz")) << resampled;
+  EXPECT_TRUE(contains(resampled, "nothing is chosen often enough")) << resampled;
+}
+
+TEST(DiagnosisText, SaysOnceOfEachParameterWithWhatItDiffersAndNotThatItIsMissingWhereSomethingIsNamed) {
+  Diagnosis d = with_ripple(0.1, 10.0);
+  for (const char* over : {"speed", "time"}) {
+    selection::Trend trend;
+    trend.id = "coulomb_friction";
+    trend.parameter = "torque";
+    trend.over = over;
+    d.parameter_trends.push_back(trend);
+  }
+  EXPECT_TRUE(contains(unwrapped(text_of(d)),
+                       "Without what is named, coulomb_friction.torque differs between experiments with speed and "
+                       "time; see whether it still does with it."));
+  d.named.clear();
+  EXPECT_TRUE(contains(unwrapped(text_of(d)),
+                       "coulomb_friction.torque differs between experiments with speed and time: the model lacks "
+                       "something that depends on one of these."));
+}
+
 TEST(DiagnosisText, HasSharesOfTheErrorFromZeroToAHundredPerCentAndTheJsonAsTheyWereFound) {
   Diagnosis d = with_ripple(0.1, 10.0);
   d.resampling.emplace();

@@ -17,7 +17,7 @@
 #include "host/engine/estimation/identify.hpp"
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/diagnosis.hpp"
-#include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 

@@ -11,6 +11,8 @@
 #include <memory>
 #include <optional>
 #include <regex>
+#include <string_view>
+#include <utility>
 
 #include "host/app/cli/arguments.hpp"
 #include "host/app/cli/help_format.hpp"
@@ -38,13 +40,30 @@ CLI::Validator sign_check(bool zero_is_allowed) {
       name);
 }
 
-// "--separate: At least 2 required but received 1": says nothing of how values are separated.
+// "--separate: At least 2 required but received 1": says nothing of how values are separated. "Could not convert:
+// --cutoff-hz = 5kHz": nothing of what it takes.
 std::string in_words(const std::string& error) {
   static const std::regex too_few("(.*): At least ([0-9]+) required but received ([0-9]+)");
+  static const std::regex no_number("Could not convert: (.*) = (.*)");
   std::smatch part;
+  if (std::regex_match(error, part, no_number))
+    return fmt::format("{} takes a number without a unit, as 5000 or 0.05, and \"{}\" was given", part.str(1),
+                       part.str(2));
   if (!std::regex_match(error, part, too_few)) return error;
   return fmt::format("{} takes {} values with a comma between them, and {} {} given", part.str(1), part.str(2),
                      part.str(3), part.str(3) == "1" ? "was" : "were");
+}
+
+// Commands by words that other tools have for them.
+std::string other_word_for(const std::string& word) {
+  constexpr std::pair<std::string_view, std::string_view> kWords[] = {
+      {"explain", "effects"},  {"list", "effects"},     {"fit", "identify"},    {"estimate", "identify"},
+      {"validate", "compare"}, {"evaluate", "compare"}, {"plot", "compare"},    {"residuals", "compare"},
+      {"analyse", "diagnose"}, {"analyze", "diagnose"}, {"convert", "measure"}, {"init", "new"},
+      {"quantise", "pack"},    {"quantize", "pack"},    {"upload", "flash"},    {"run", "hil"},
+      {"ui", "workbench"},     {"gui", "workbench"}};
+  const auto found = std::ranges::find(kWords, std::string_view(word), [](const auto& pair) { return pair.first; });
+  return found == std::end(kWords) ? std::string() : std::string(found->second);
 }
 
 }  // namespace
@@ -207,7 +226,8 @@ class CommandLine {
       names.push_back(sub->get_name());
     if (std::find(names.begin(), names.end(), command) != names.end()) return {};
     const std::vector<std::string_view> known(names.begin(), names.end());
-    const std::string near = text::nearest(command, known);
+    std::string near = other_word_for(command);
+    if (near.empty()) near = text::nearest(command, known);
     return fmt::format(
         "there is no command \"{}\"; {}", command,
         near.empty() ? std::string("flexspline --help lists them") : fmt::format("did you mean {}?", near));

@@ -8,6 +8,7 @@
 
 #include "host/engine/estimation/cancellation.hpp"
 #include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 #include "host/output/answers/json.hpp"
 
 namespace flexspline::workbench {

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <span>
 
-#include "host/engine/selection/wald_test.hpp"
+#include "host/engine/selection/policy.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 #include "host/output/answers/disturbance_text.hpp"
 #include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/explanation.hpp"
@@ -23,45 +24,6 @@ using selection::Diagnosis;
 using selection::Verdict;
 
 constexpr std::size_t kRowsShown = 10;
-// Errors that differ by less are reported as equal.
-constexpr double kRunFrictionMatters = 0.95;
-
-// The squared error that a term takes off may be more than what is above the noise, which is an estimate.
-double clipped(double share_percent) {
-  return std::clamp(share_percent, 0.0, 100.0);
-}
-
-// A share above zero is not called 0 %.
-std::string percent(double share) {
-  return share > 0.0 && share < 1.0 ? "less than 1" : fmt::format("{:.0f}", share);
-}
-
-std::string evidence(const Diagnosis& d) {
-  std::string text;
-  if (d.balance) text += fmt::format("{} balance: ", catalogue::balance_name(*d.balance));
-  text += fmt::format("error {}, {} on data left out of the fit", with_unit(d.base_rmse, d.unit),
-                      with_unit(d.base_rmse_cv, d.unit));
-  // What other commands, which leave neither out, count as error.
-  if (!d.delay_advice.empty())
-    text += d.reversals_left_out ? ", both without reversals and without the delay of the effort"
-                                 : ", both without the delay of the effort";
-  else if (d.reversals_left_out)
-    text += ", both without reversals";
-  if (d.noise_floor)
-    text += fmt::format("; noise {} (from {}), so the error is {:.3g} times the noise",
-                        with_unit(*d.noise_floor, d.unit), d.noise_floor_from, d.base_rmse / *d.noise_floor);
-  else if (d.noise_of_some)
-    text += fmt::format("; the noise is known in {} only: {} (from {}), where the error is {:.3g} times that",
-                        listed(d.noise_of_some->records), with_unit(d.noise_of_some->noise, d.unit),
-                        d.noise_of_some->from, d.noise_of_some->rmse / d.noise_of_some->noise);
-  else
-    text += "; noise not known (state noise_std_COLUMN in dataset.toml, or record a periodic motion)";
-  // What is named may pass for friction that differs; only where nothing is, the difference is the runs' own.
-  if (d.named.empty() && d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
-    text += fmt::format("; with friction that is each run's own {}{}", with_unit(d.base_rmse_own_friction, d.unit),
-                        d.noise_floor ? fmt::format(", {:.3g} times", d.base_rmse_own_friction / *d.noise_floor) : "");
-  return text;
-}
 
 std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   std::vector<std::string> texts;
@@ -69,11 +31,6 @@ std::string shares(const std::vector<selection::LocalisedResidual>& parts) {
   for (const selection::LocalisedResidual& part : std::span(parts).first(std::min<std::size_t>(3, parts.size())))
     texts.push_back(fmt::format("{} {:.1f} %", part.variable, part.share_percent));
   return listed(texts);
-}
-
-// "2.4 %": root mean square of the error over that of the measured side of the balance.
-std::string share_of_target(const Diagnosis& d) {
-  return d.target_rms > 0.0 ? fmt::format("{:.2g} %", 100.0 * d.base_rmse / d.target_rms) : "a part";
 }
 
 std::string explained_in_words(double percent) {
@@ -95,10 +52,14 @@ std::string candidate_table(const Diagnosis& d, const model::Drive* drive) {
   return table.text();
 }
 
-const Candidate* candidate_of(const Diagnosis& d, const selection::NamedEffect& named) {
-  for (const Candidate& c : d.candidates)
-    if (selection::NamedEffect{c.effect, c.order} == named) return &c;
-  return nullptr;
+// What the columns are.
+std::string about_table() {
+  return fmt::format(
+      "score: twice the logarithm of the likelihood ratio on data left out of the fit, less the penalty for "
+      "parameters; "
+      "a name needs {}. explains: the part of the squared error, weighted by the noise of each record, that it takes "
+      "off there; errors are not weighted.",
+      number(selection::kPolicy.named_score, 3));
 }
 
 std::string replaced(std::string text, std::string_view what, const std::string& by) {
@@ -193,130 +154,6 @@ std::string law_in_range_text(const selection::LawInRange& law) {
 
 }  // namespace
 
-std::string effect_label(const std::string& effect, const std::optional<double>& order) {
-  return order ? fmt::format("{}:{:g}", effect, *order) : effect;
-}
-
-std::string effect_in_words(const std::string& effect, const std::optional<double>& order) {
-  return order ? fmt::format("{} ({:g} per turn)", effect, *order) : effect;
-}
-
-std::string verdict_in_words(const Diagnosis& d) {
-  std::vector<std::string> names;
-  for (const selection::NamedEffect& n : d.named) names.push_back(effect_in_words(n.effect, n.order));
-  switch (d.verdict) {
-    case Verdict::missing_effect:
-      return fmt::format("The model lacks {}.", listed(names));
-    case Verdict::confusable_effects:
-      return fmt::format("The model lacks one of {}; these data cannot show which.", listed(names, "or"));
-    case Verdict::at_noise_floor:
-      if (!d.possible.empty())
-        return "No effect can be named: the model's error is the noise of the measurement. What may be missing is "
-               "below.";
-      if (d.base_rmse_own_friction < kRunFrictionMatters * d.base_rmse)
-        return "Nothing is missing: friction differs from run to run, and otherwise the model's error is the noise "
-               "of the measurement.";
-      return "Nothing is missing: the model's error is the noise of the measurement.";
-    case Verdict::nothing_significant: {
-      const bool is_more_below = !d.possible.empty() || (d.resampling && !d.resampling->found.empty());
-      if (is_more_below)
-        return fmt::format("No effect of the catalogue can be named; what may be missing is below. The {}.",
-                           d.noise_floor     ? "model's error is above the noise of the measurement"
-                           : d.noise_of_some ? "noise level is known in some records only"
-                                             : "noise level is not known");
-      if (d.noise_floor)
-        return fmt::format(
-            "No effect of the catalogue improves the model. Its error is {:.2g} times the noise of the measurement, "
-            "but "
-            "depends on no measured signal.",
-            d.base_rmse / *d.noise_floor);
-      return fmt::format(
-          "No effect of the catalogue improves the model. It leaves {} of the {} balance's measured side; how much of "
-          "that is noise is {}.",
-          share_of_target(d), catalogue::balance_name(d.balance.value_or(estimation::Balance::motor)),
-          d.noise_of_some ? "known in some records only" : "not known");
-    }
-    case Verdict::unknown_structure:
-      return d.possible.empty() ? "Something is missing that no effect of the catalogue explains."
-                                : "Something is missing. No effect of the catalogue explains it for certain; what may "
-                                  "explain it is below.";
-    case Verdict::insufficient_excitation:
-      return "These data do not excite the drive enough to show it.";
-  }
-  return {};
-}
-
-// The result on the experiments that are held out. They decide whether an effect is named, so that their error is no
-// proof of the gain.
-void print_held_out(Console& console, const selection::Resampling& r) {
-  std::vector<std::string> better, worse;
-  for (const selection::Resampling::FoundTerm& f : r.found) {
-    if (!f.held_out_ratio || f.group.empty()) continue;
-    const std::string name = effect_in_words(f.group.front().effect, f.group.front().order);
-    (f.refused_by_holdout ? worse : better).push_back(fmt::format("{} {:.3f}", name, *f.held_out_ratio));
-  }
-  if (better.empty() && worse.empty()) return;
-  std::string text = "Error on the experiments that are held out, with the effect over without it: ";
-  text += listed(better.empty() ? worse : better);
-  if (!better.empty() && !worse.empty()) text += fmt::format("; {}", listed(worse));
-  text += worse.empty() ? "."
-                        : fmt::format(". It rises with {}, so {} not named.", listed(worse),
-                                      worse.size() > 1 ? "these are" : "that is");
-  console.line(wrapped(text +
-                       " As it was used to decide, it does not prove the gain: test that with `compare` on data of a "
-                       "later measurement."));
-}
-
-// Of a structure that no single effect of the catalogue explains best.
-std::string name_outside_catalogue(const std::string& name) {
-  const bool are_several = name.find(" or ") != std::string::npos;
-  return name + (are_several ? ", which these data cannot distinguish," : ", which is in no catalogue,");
-}
-
-void print_resampling(Console& console, const selection::Resampling& r) {
-  std::vector<std::string> found;
-  for (const selection::Resampling::FoundTerm& f : r.found) {
-    std::vector<std::string> names;
-    for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
-    found.push_back(fmt::format("{} in {:.0f} of 100 ({} % of the squared error above the noise, {:.0f} to {:.0f} %)",
-                                names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"),
-                                100.0 * f.frequency, percent(clipped(f.share_percent)), clipped(f.share_low_percent),
-                                clipped(f.share_high_percent)));
-  }
-  const std::string how =
-      fmt::format("{:.0f} subsamples at bandwidths from {:.3g} to {:.3g} Hz, with and without reversals", r.subsamples,
-                  r.lowest_hz, r.highest_hz);
-  console.line(wrapped(found.empty() ? fmt::format("Nothing is chosen often enough in {}.", how)
-                                     : fmt::format("Of {}: {}.", how, listed(found))));
-  print_held_out(console, r);
-}
-
-std::string words(const std::vector<selection::NamedEffect>& group) {
-  std::vector<std::string> names;
-  for (const selection::NamedEffect& n : group) names.push_back(effect_in_words(n.effect, n.order));
-  return listed(names, "or");
-}
-
-// What to record where an effect is neither shown nor ruled out.
-std::string what_decides(const Diagnosis& d, const selection::NamedEffect& effect) {
-  if (const Candidate* c = candidate_of(d, effect); c && !selection::doubt_about_presliding(*c).empty())
-    return "slower reversals, or the same at a higher sample rate or with a finer encoder";
-  const catalogue::Entry* entry = catalogue::find(effect.effect);
-  return entry ? std::string(entry->info->separated_by) : "";
-}
-
-// What these data neither show nor rule out, and what to record.
-void print_possible(Console& console, const Diagnosis& d) {
-  for (const selection::PossibleEffect& one : d.possible) {
-    std::string text = fmt::format("These data do not decide whether {} is missing", words(one.group));
-    if (one.frequency) text += fmt::format(": chosen in {:.0f} of 100 subsamples", 100.0 * *one.frequency);
-    text += fmt::format("; {}.", one.why_not);
-    if (const std::string record = what_decides(d, one.group.front()); !record.empty())
-      text += fmt::format(" To decide, record: {}.", record);
-    console.line(wrapped(words_on(axis_of(d.unit), text)));
-  }
-}
-
 // Candidates that are one with an effect of the model on these data.
 void print_confounded_with_model(Console& console, const Diagnosis& d) {
   for (const Candidate& c : d.candidates) {
@@ -368,9 +205,9 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   const bool untried_first = d.named.empty() && d.verdict != Verdict::at_noise_floor;
   if (!untried.empty() && untried_first) console.line(untried);
   print_sizes(console, d);
-  console.line(wrapped(evidence(d)));
-  if (d.resampling && d.resampling->decides) print_resampling(console, *d.resampling);
-  print_possible(console, d);
+  console.line(wrapped(error_in_words(d)));
+  for (const std::string& sentence : certainty_in_words(d)) console.line(wrapped(sentence));
+  for (const std::string& sentence : possible_in_words(d)) console.line(wrapped(sentence));
   if (!d.localised.empty())
     console.line(wrapped(words_on(axis, fmt::format("The error depends on {}.", shares(d.localised)))));
   if (!delay.empty() && !delay_first) console.line(delay);
@@ -385,12 +222,10 @@ void print_diagnosis(Console& console, const Diagnosis& d, const std::string& ad
   if (!d.candidates.empty()) {
     console.line();
     console.line(candidate_table(d, drive));
+    console.line(wrapped(about_table()));
     print_confounded_with_model(console, d);
   }
-  for (const selection::Trend& t : d.parameter_trends)
-    console.line(
-        wrapped(fmt::format("{}.{} differs between experiments with {}: the model lacks something that depends on it.",
-                            t.id, t.parameter, t.over)));
+  for (const std::string& sentence : trends_in_words(d)) console.line(wrapped(sentence));
   if (!d.named.empty() && !d.remaining_structure.empty())
     console.line(wrapped(fmt::format("With {}, the error still depends on {}.",
                                      d.between_records ? "friction that is each record's own" : "that added",

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,14 +9,6 @@
 #include "host/output/answers/console.hpp"
 
 namespace flexspline::output {
-
-// "torque_ripple:2", as the command `add` takes it.
-std::string effect_label(const std::string& effect, const std::optional<double>& order);
-// "torque_ripple (2 per turn)", for people.
-std::string effect_in_words(const std::string& effect, const std::optional<double>& order);
-
-// "The model lacks stribeck_gaussian."
-std::string verdict_in_words(const selection::Diagnosis& found);
 
 // Verdict, evidence, candidates, effects that cannot be distinguished, with the experiment that separates them, where
 // the error is, what to do next. `add_command`: what to type to add the named effect, with EFFECT where its name

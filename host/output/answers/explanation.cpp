@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 #include "host/output/answers/drive_words.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"

@@ -11,8 +11,8 @@ function candidateCard(c, round) {
   const card = el("div", { class: "card" }, el("h3", {}, effectName(c)));
   if (c.explanation) card.append(el("p", {}, c.explanation));
   card.append(el("p", {}, el("strong", {}, "Evidence: "), `with it, the error of the ${c.balance} balance on data left out of the fit decreases from ` +
-    `${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}; it explains ${number(c.chi2_fall_percent, 3)} % of what the model leaves. ` +
-    `The score is ${number(c.score, 3)} (20 would do): ${scoreInWords(c)}.`));
+    `${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error there, weighted by each experiment's noise. ` +
+    `The score is ${number(c.score, 3)} (a name needs 20): ${scoreInWords(c)}.`));
   if (c.note) card.append(el("p", {}, c.note));
   if (c.evidence && c.evidence.bins.length) card.append(evidenceTable(c.evidence));
   if (c.consequence) card.append(el("p", {}, el("strong", {}, "What it does: "), c.consequence));
@@ -82,6 +82,9 @@ function fillUnknown(s, c) {
 
 function fillRound(s, round) {
   s.append(el("p", {}, round.verdict_in_words));
+  for (const size of round.sizes) s.append(el("p", {}, size, "."));
+  s.append(el("p", {}, round.error_in_words, "."));
+  for (const sentence of [...round.certainty, ...round.possible_in_words]) s.append(el("p", {}, sentence));
   const telling = round.localised.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`);
   if (telling.length) s.append(el("p", {}, `Most of the error depends on ${listed(telling)}; shares overlap, as these quantities move together.`));
   if (round.delay_s !== null)
@@ -95,14 +98,14 @@ function fillRound(s, round) {
   }
   if (round.unknown) fillUnknown(s, round.unknown);
   if (round.candidates.length) {
-    s.append(candidateTable(round.candidates.slice(0, 8), round.named, "Every effect that could be added was tried against data left out of the fit. The best of them:"));
+    s.append(candidateTable(round.candidates.slice(0, 8), round.named, "Every effect that could be added was tried against data left out of the fit. The best of them. Score: twice the logarithm of the likelihood ratio, less the penalty for parameters; " +
+      "a name needs 20. Explains: part of the squared error, weighted by each experiment's noise; errors are not weighted."));
     if (round.candidates.length > 8)
       s.append(folded(`${round.candidates.length - 8} more candidates`, false, (body) => body.append(candidateTable(round.candidates.slice(8), round.named, "The others, best first"))));
   }
-  for (const t of round.parameter_trends)
-    s.append(el("p", { class: "note" }, `${t.id}.${t.parameter} differs between experiments with ${t.over}: the model lacks something that depends on it.`));
+  for (const sentence of round.trends_in_words) s.append(el("p", { class: "note" }, sentence));
   if (round.named.length && round.remaining_structure.length)
-    s.append(el("p", {}, `With that added, the error still depends on ${listed(round.remaining_structure.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`))}.`));
+    s.append(el("p", {}, `With the named effect added, the error still depends on ${listed(round.remaining_structure.slice(0, 3).map((l) => `${variableName(l.variable)} (${number(l.share_percent, 3)} %)`))}.`));
   if (round.disturbances.length)
     s.append(table("Something from outside acted on the axis in these intervals; they were left out.", ["experiment", { n: "from" }, { n: "to" }, { n: "peak" }],
       round.disturbances.map((d) => [d.experiment, { n: withUnit(d.from_s, "s") }, { n: withUnit(d.to_s, "s") }, { n: withUnit(d.peak, d.unit) }])));

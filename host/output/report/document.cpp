@@ -12,6 +12,8 @@
 #include "host/input/data/record_time.hpp"
 #include "host/output/answers/comparison.hpp"
 #include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
+#include "host/output/answers/explanation.hpp"
 #include "host/output/answers/identification.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/report/assets.hpp"
@@ -39,10 +41,18 @@ json comparison_json(const comparison::Comparison& comparison) {
   return answer;
 }
 
-// For the page alone: equations of the candidates, and times as its plots have them.
+// For the page alone: sentences of the terminal, equations of the candidates, and times as its plots have them.
 json diagnosis_json(const selection::Diagnosis& found, const data::Dataset& dataset) {
   json answer = output::diagnosis_json(found);
   answer["verdict_in_words"] = output::verdict_in_words(found);
+  answer["error_in_words"] = output::error_in_words(found);
+  answer["certainty"] = output::certainty_in_words(found);
+  answer["possible_in_words"] = output::possible_in_words(found);
+  answer["trends_in_words"] = output::trends_in_words(found);
+  answer["sizes"] = json::array();
+  for (const selection::NamedEffect& named : found.named)
+    if (const selection::Candidate* c = output::candidate_of(found, named); c && c->size)
+      answer["sizes"].push_back(output::size_in_words(*c, found.unit));
   for (json& candidate : answer["candidates"]) {
     const catalogue::Entry* entry = catalogue::find(candidate["effect"].get<std::string>());
     candidate["equation"] = entry ? json(entry->info->equation) : json(nullptr);

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/engine/estimation/standard_intervals.hpp"
-#include "host/output/answers/diagnosis.hpp"
+#include "host/output/answers/diagnosis_sentences.hpp"
 #include "host/output/answers/json.hpp"
 #include "host/output/answers/text.hpp"
 #include "host/output/report/parts.hpp"
@@ -129,7 +129,8 @@ json verdict(const Subject& subject, const View& view) {
     json result = of_addition(*subject.addition, subject.command == "remove");
     // A diagnosis came first: its words, then what became of it.
     if (!subject.rounds.empty())
-      result["verdict"] = output::verdict_in_words(subject.rounds.front()) + " " + result["verdict"].get<std::string>();
+      result["verdict"] = fmt::format("Before: {} Now: {}", output::verdict_in_words(subject.rounds.front()),
+                                      result["verdict"].get<std::string>());
     return result;
   }
   if (subject.rounds.empty()) return of_comparison(view);

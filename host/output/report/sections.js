@@ -99,7 +99,7 @@ function freeRunTable() {
   const signals = [...new Set(report.comparison.overall.filter((s) => !isBalance(s)).map((s) => s.signal))];
   if (!signals.length) return null;
   const unit = (signal) => unitText(report.comparison.overall.find((s) => s.signal === signal).unit);
-  return table("Free run: what the model does with the measured effort alone, from the measured start. Root mean square error; errors of positions sum up over time.",
+  return table("Free run: what the model does with the measured effort alone, from the measured start. Root mean square error; errors of positions sum up over time. In slow motion a small error of friction changes the motion much: an error that is large here and small in the balances above is that.",
     ["experiment", ...signals.map((s) => ({ n: `${signalName(s)} (${unit(s)})` }))],
     experiments.filter((e) => e.signals.some((s) => !isBalance(s))).map((e) => [el("span", {}, e.name, roleTag(e.role)), ...signals.map((signal) => {
       const s = e.signals.find((x) => x.signal === signal);
@@ -156,7 +156,7 @@ function fillExperiment(body, trace) {
 
 {
   const s = section("How good is the model?", `The model is asked for the ${effort} that the measured motion takes, and that is compared with the ${effort} that was measured, ` +
-    "balance by balance: at the motor, through the gear, at the load. What is left over is the error.");
+    "for each torque balance: of the motor, of the transmission, of the load. The difference is the error.");
   s.append(...[errorTable(), freeRunTable(), baselineTable()].filter(Boolean));
   for (const warning of report.comparison.warnings) s.append(el("p", { class: "note" }, warning));
   const traces = new Map(report.traces.map((t) => [t.experiment, t]));
@@ -202,7 +202,7 @@ function mapFigure(signal, unit, m) {
   return figure({
     title, half: true, height: 190,
     label: `Mean error of the ${signalName(signal)} over ${name}; it explains ${number(share, 3)} % of the error's variance`,
-    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the error's variance depends on it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be distinguished from chance",
+    caption: share > 0 ? el("span", {}, el("strong", {}, `${number(share, 3)} %`), ` of the ${before ? "variance of the error before" : "error's variance"} depends on it${m.share_with_direction_percent > m.share_percent ? ", by direction of motion" : ""}`) : "no structure that could be distinguished from chance",
     make: (k, plot) => ({
       data: [m.x, noise, noise.map((v) => (v === null ? null : -v)), up(m.plain, 2), up(m.plain, -2), up(m.with_direction, 2), up(m.with_direction, -2),
         m.plain.mean, m.with_direction.mean, ...(m.plain_before ? [m.plain_before.mean, m.with_direction_before.mean] : [])],
@@ -363,7 +363,9 @@ function frictionFigure(f, title, top) {
 
 // ---- what is missing ----
 if (report.rounds.length) {
-  const s = section("What is missing?");
+  const s = report.addition
+    ? section("What was missing?", `Diagnosis of the model without ${report.addition.effect}, by cross-validation. What became of the error is in the last part.`)
+    : section("What is missing?");
   report.rounds.forEach((round, k) => {
     if (report.rounds.length > 1) s.append(el("h3", {}, `Round ${k + 1}`));
     fillRound(s, round);
