@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "host/engine/comparison/noise_floor.hpp"
@@ -235,10 +236,21 @@ void look_between_records(const estimation::Identification& base, const estimati
 
 // Whether the data could show anything at all.
 void assess_excitation(bool moves, Diagnosis& result) {
-  if (result.resampling && result.resampling->too_little)
+  const bool has_too_little = result.resampling && result.resampling->too_little;
+  if (has_too_little)
     result.warnings.push_back(
         "these data have too few samples to choose effects on halves of them; record longer, with several strokes");
-  if (!moves || (result.resampling && result.resampling->too_little)) result.verdict = Verdict::insufficient_excitation;
+  if (!moves || has_too_little) result.verdict = Verdict::insufficient_excitation;
+  const double times = std::pow(result.base_rmse_cv / result.base_rmse, 2);
+  if (!moves || !(times > kPolicy.most_left_out_squares)) return;
+  const std::string why = fmt::format(
+      "on data left out of the fit the model alone has {:.3g} times the squared error: too few independent samples for "
+      "its parameters",
+      times);
+  for (const NamedEffect& name : result.named) result.possible.push_back({{name}, why, std::nullopt, std::nullopt});
+  result.named.clear();
+  result.warnings.push_back(why + "; record longer, with several strokes, and slow and fast motion");
+  result.verdict = Verdict::insufficient_excitation;
 }
 
 // Effects of the current are no candidates where the effort is a torque, which often is a current times a constant.

@@ -128,6 +128,9 @@ struct SelectionPolicy {
   double least_travel_noise = 4.0;
   double presliding_shape_factor = 4.0;  // of shorter and longer bristles over the travel of the law
 
+  // Squared error of a model on data left out of the fit over that on the fitted. With p parameters from n independent
+  // samples (n + p)/(n - p) is expected (Akaike 1969, final prediction error): 2 is three samples for each parameter.
+  double most_left_out_squares = 2.0;
   // Samples for each column of a fit: with fewer, halves of the data say nothing.
   double fewest_rows_per_column = 10.0;
   // Rows of the table by which effort and motion may be stamped apart, as loggers differ by a few samples; and seconds
