@@ -43,14 +43,18 @@ std::string name_outside_catalogue(const std::string& name) {
   return name + (are_several ? ", which these data cannot distinguish," : ", which is in no catalogue,");
 }
 
+std::string words(const std::vector<selection::NamedEffect>& group) {
+  std::vector<std::string> names;
+  for (const selection::NamedEffect& n : group) names.push_back(effect_in_words(n.effect, n.order));
+  return listed(names, "or");
+}
+
 std::string resampling_in_words(const selection::Resampling& r) {
   std::vector<std::string> found;
   for (const selection::Resampling::FoundTerm& f : r.found) {
-    std::vector<std::string> names;
-    for (const selection::NamedEffect& n : f.group) names.push_back(effect_in_words(n.effect, n.order));
     found.push_back(
         fmt::format("{} is chosen in {:.0f} of 100 ({} % of the squared error above the noise, {:.0f} to {:.0f} %)",
-                    names.empty() ? name_outside_catalogue(f.name) : listed(names, "or"), 100.0 * f.frequency,
+                    f.group.empty() ? name_outside_catalogue(f.name) : words(f.group), 100.0 * f.frequency,
                     percent(clipped(f.share_percent)), clipped(f.share_low_percent), clipped(f.share_high_percent)));
   }
   return fmt::format(
@@ -78,12 +82,6 @@ std::string held_out_in_words(const selection::Resampling& r) {
   return text +
          " As it was used to decide, it does not prove the gain: test that with `compare` on data of a later "
          "measurement.";
-}
-
-std::string words(const std::vector<selection::NamedEffect>& group) {
-  std::vector<std::string> names;
-  for (const selection::NamedEffect& n : group) names.push_back(effect_in_words(n.effect, n.order));
-  return listed(names, "or");
 }
 
 // What to record where an effect is neither shown nor ruled out.
