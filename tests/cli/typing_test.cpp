@@ -49,14 +49,17 @@ TEST(Typing, ACommandByTheWordOfAnotherToolNamesOurs) {
   }
 }
 
-TEST(Typing, AValueWithAUnitIsAnsweredWithWhatTheOptionTakes) {
+TEST(Typing, AValueThatCannotBeReadIsAnsweredWithWhatTheOptionTakes) {
   const Shell shell;
   shell.write("data.csv", "time_s,current_a\n0,1\n");
-  const Answer answer = shell.run("flexspline identify data.csv --model model.toml --cutoff-hz 5kHz");
-  EXPECT_EQ(answer.code, 2);
-  EXPECT_TRUE(
-      contains(answer.err, "--cutoff-hz takes a number without a unit, as 5000 or 0.05, and \"5kHz\" was given"))
-      << answer.err;
+  for (const auto& [line, answered] :
+       {std::pair{"flexspline identify data.csv --model model.toml --cutoff-hz 5kHz",
+                  "--cutoff-hz takes a number without a unit, and \"5kHz\" was given"},
+        {"flexspline demo --seed 0.5", "--seed takes a whole number without a unit, and \"0.5\" was given"}}) {
+    const Answer answer = shell.run(line);
+    EXPECT_EQ(answer.code, 2);
+    EXPECT_TRUE(contains(answer.err, answered)) << answer.err;
+  }
 }
 
 TEST(Typing, AMisspeltEffectNamesTheOneThatWasMeant) {

@@ -46,9 +46,12 @@ std::string in_words(const std::string& error) {
   static const std::regex too_few("(.*): At least ([0-9]+) required but received ([0-9]+)");
   static const std::regex no_number("Could not convert: (.*) = (.*)");
   std::smatch part;
-  if (std::regex_match(error, part, no_number))
-    return fmt::format("{} takes a number without a unit, as 5000 or 0.05, and \"{}\" was given", part.str(1),
-                       part.str(2));
+  if (std::regex_match(error, part, no_number)) {
+    double value = 0.0;
+    const bool is_number = CLI::detail::lexical_cast(part.str(2), value);
+    return fmt::format("{} takes a {} without a unit, and \"{}\" was given", part.str(1),
+                       is_number ? "whole number" : "number", part.str(2));
+  }
   if (!std::regex_match(error, part, too_few)) return error;
   return fmt::format("{} takes {} values with a comma between them, and {} {} given", part.str(1), part.str(2),
                      part.str(3), part.str(3) == "1" ? "was" : "were");

@@ -249,6 +249,8 @@ void assess_excitation(bool moves, Diagnosis& result) {
       times);
   for (const NamedEffect& name : result.named) result.possible.push_back({{name}, why, std::nullopt, std::nullopt});
   result.named.clear();
+  result.unknown.reset();
+  result.partial = false;
   result.warnings.push_back(why + "; record longer, with several strokes, and slow and fast motion");
   result.verdict = Verdict::insufficient_excitation;
 }

@@ -233,8 +233,9 @@ struct Diagnosis {
   std::optional<UnknownStructure> unknown;  // where the verdict is unknown_structure and a curve shows what it is
   std::optional<BetweenRecords> between_records;
   std::optional<LawInRange> law_in_range;
-  std::optional<double> delay_s;  // of the effort against the motion, beyond the alignment, where significant
-  std::string delay_advice;       // where it is large enough to matter
+  std::optional<double>
+      delay_s;  // of the effort against the motion, where significant; the half sample of a held one is out
+  std::string delay_advice;    // where it is large enough to matter
   std::string untried_advice;  // which effects these signals cannot show, where something is missing that is not named
   std::optional<StatedSetting> at_stated_setting;
 };

@@ -50,11 +50,9 @@ std::string delay_advice(double delay_s, const estimation::PreparedData& prepare
     return what +
            ": it was moved by half a sample, as if the drive held it from sample to sample. If yours does not, state "
            "current_hold = \"none\" in dataset.toml.";
-  return what + (delay_s > 0.0
-                     ? ", dead times that are stated are taken out: check the time stamps and filters of the log."
-                     : ", dead times that are stated are taken out: it acts later than it is logged, as a commanded "
-                       "current does "
-                       "(current_delay), or the time stamps differ.");
+  return what + (delay_s > 0.0 ? ": check the time stamps and filters of the log."
+                               : ": it acts later than it is logged, as a commanded current does (current_delay), or "
+                                 "the time stamps differ.");
 }
 
 void add_drifts(const SearchedBalance& balance, const CrossValidatedFit& fit, Diagnosis& result) {
