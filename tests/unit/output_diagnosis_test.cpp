@@ -61,7 +61,7 @@ TEST(DiagnosisAnswer, SaysWhereTheNoiseIsKnownAndWhatTheErrorsLeaveOut) {
   }
   std::string text = ::testing::internal::GetCapturedStdout();
   for (std::size_t at = 0; (at = text.find("\n  ", at)) != std::string::npos;) text.replace(at, 3, " ");
-  EXPECT_NE(text.find("error 0.002 N*m, 0.003 N*m on data left out of the fit, both without reversals and without the "
+  EXPECT_NE(text.find("error 0.002 N*m, 0.003 N*m in cross-validation, both without reversals and without the "
                       "delay of the effort; the noise is known in sine only: 0.0005 N*m (from periods), where the "
                       "error is 2 times that"),
             std::string::npos)

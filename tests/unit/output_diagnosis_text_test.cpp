@@ -97,8 +97,8 @@ TEST(DiagnosisText, SaysHowCertainANameIsByTheMethodThatDecided) {
   Diagnosis d = with_ripple(0.1, 10.0);
   d.candidates.front().score = 347.2;
   EXPECT_TRUE(contains(unwrapped(text_of(d)),
-                       "Score 347.2 for torque_ripple (2 per turn); a name needs 19.5, which one of 1000 simulated "
-                       "drives passes where nothing is missing."));
+                       "Score 347.2 for torque_ripple (2 per turn); a name needs 19.5, which 1 of 1000 simulated "
+                       "drives with nothing missing exceeds."));
   d.resampling.emplace();
   d.resampling->decides = true;
   d.resampling->subsamples = 84.0;

@@ -244,7 +244,7 @@ void assess_excitation(bool moves, Diagnosis& result) {
   const double times = std::pow(result.base_rmse_cv / result.base_rmse, 2);
   if (!moves || !(times > kPolicy.most_left_out_squares)) return;
   const std::string why = fmt::format(
-      "on data left out of the fit the model alone has {:.3g} times the squared error: too few independent samples for "
+      "in cross-validation the model alone has {:.3g} times the squared error: too few independent samples for "
       "its parameters",
       times);
   for (const NamedEffect& name : result.named) result.possible.push_back({{name}, why, std::nullopt, std::nullopt});

@@ -55,7 +55,7 @@ std::string candidate_table(const Diagnosis& d, const model::Drive* drive) {
 // What the columns are.
 std::string about_table() {
   return fmt::format(
-      "score: twice the logarithm of the likelihood ratio on data left out of the fit, less the penalty for "
+      "score: twice the logarithm of the likelihood ratio in cross-validation, less the penalty for "
       "parameters; "
       "a name needs {}. explains: the part of the squared error, weighted by the noise of each record, that it takes "
       "off there; errors are not weighted.",
@@ -116,7 +116,7 @@ void print_unknown(Console& console, const Diagnosis& d) {
   const selection::UnknownStructure& u = *d.unknown;
   console.line();
   console.line(
-      wrapped(fmt::format("It depends on {}{}: a curve over it reduces the squared error on data left out of the fit "
+      wrapped(fmt::format("It depends on {}{}: a curve over it reduces the squared error in cross-validation "
                           "by {:.1f} % (score {:.0f}). At the points that the data reach it is known to {}.",
                           u.definition.variable, u.definition.times_direction ? ", times the direction of motion" : "",
                           u.curve.decrease_percent, u.curve.score, with_unit(typical_error(u.curve), d.unit))));

@@ -156,7 +156,7 @@ std::string verdict_in_words(const Diagnosis& d) {
 std::string error_in_words(const Diagnosis& d) {
   std::string text;
   if (d.balance) text += fmt::format("{} balance: ", catalogue::balance_name(*d.balance));
-  text += fmt::format("error {}, {} on data left out of the fit", with_unit(d.base_rmse, d.unit),
+  text += fmt::format("error {}, {} in cross-validation", with_unit(d.base_rmse, d.unit),
                       with_unit(d.base_rmse_cv, d.unit));
   // What other commands, which leave neither out, count as error.
   if (!d.delay_advice.empty())
@@ -194,7 +194,7 @@ std::vector<std::string> certainty_in_words(const Diagnosis& d) {
       scores.push_back(fmt::format("{} for {}", number(c->score), effect_in_words(c->effect, c->order)));
   if (!scores.empty())
     sentences.push_back(
-        fmt::format("Score {}; a name needs {}, which one of 1000 simulated drives passes where nothing is missing.",
+        fmt::format("Score {}; a name needs {}, which 1 of 1000 simulated drives with nothing missing exceeds.",
                     listed(scores), number(selection::kPolicy.named_score, 3)));
   return sentences;
 }

@@ -20,7 +20,7 @@ const selection::Candidate* candidate_of(const selection::Diagnosis& found, cons
 // "The model lacks stribeck_gaussian."
 std::string verdict_in_words(const selection::Diagnosis& found);
 
-// "motor balance: error 0.012 N*m, 0.013 N*m on data left out of the fit; noise 0.004 N*m (from periods), ..."
+// "motor balance: error 0.012 N*m, 0.013 N*m in cross-validation; noise 0.004 N*m (from periods), ..."
 std::string error_in_words(const selection::Diagnosis& found);
 
 // How certain the names are, by the method that decided: in how many subsamples each was chosen, with the result on

@@ -144,8 +144,9 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
     console.line(fmt::format("  {}", reference));
   if (c.size)
     console.line(wrapped(words_on(
-        axis_of(unit), fmt::format("Its torque that the model cannot replace: {}, {} at most{}.",
-                                   rms_in_words(*c.size, unit), number(c.size->peak), share_of_rated(*c.size, "; ")))));
+        axis_of(unit),
+        fmt::format("The part of its torque that the other effects of the model cannot replace: {}, {} at most{}.",
+                    rms_in_words(*c.size, unit), number(c.size->peak), share_of_rated(*c.size, "; ")))));
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);

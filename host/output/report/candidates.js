@@ -10,7 +10,7 @@ const effectName = (c) => (c.order === null || c.order === undefined ? c.effect 
 function candidateCard(c, round) {
   const card = el("div", { class: "card" }, el("h3", {}, effectName(c)));
   if (c.explanation) card.append(el("p", {}, c.explanation));
-  card.append(el("p", {}, el("strong", {}, "Evidence: "), `with it, the error of the ${c.balance} balance on data left out of the fit decreases from ` +
+  card.append(el("p", {}, el("strong", {}, "Evidence: "), `with it, the error of the ${c.balance} balance in cross-validation decreases from ` +
     `${withUnit(c.rmse_cv_before, c.unit)} to ${withUnit(c.rmse_cv_after, c.unit)}; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error there, weighted by each experiment's noise. ` +
     `The score is ${number(c.score, 3)} (a name needs 20): ${scoreInWords(c)}.`));
   if (c.note) card.append(el("p", {}, c.note));
@@ -62,7 +62,7 @@ function fillUnknown(s, c) {
   const name = variableName(c.variable), what = c.times_direction ? "times the direction of motion" : "";
   s.append(figure({
     title: `What no effect explains, over ${name}`, height: 240,
-    label: `${kEffort} over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error on data left out of the fit`,
+    label: `${kEffort} over ${name} that no effect of the catalogue explains; it explains ${number(c.chi2_fall_percent, 3)} % of the squared error in cross-validation`,
     caption: el("span", {}, el("strong", {}, `${number(c.chi2_fall_percent, 3)} %`), ` less squared error on data left out of its fit with this curve${what ? ", " + what : ""}`),
     key: [{ name: "learnt curve", colour: "residual" }, { name: "95 % of it", colour: "residual", kind: "band" }],
     make: (k, plot) => ({
@@ -98,7 +98,7 @@ function fillRound(s, round) {
   }
   if (round.unknown) fillUnknown(s, round.unknown);
   if (round.candidates.length) {
-    s.append(candidateTable(round.candidates.slice(0, 8), round.named, "Every effect that could be added was tried against data left out of the fit. The best of them. Score: twice the logarithm of the likelihood ratio, less the penalty for parameters; " +
+    s.append(candidateTable(round.candidates.slice(0, 8), round.named, "Every effect that could be added was cross-validated. The best of them. Score: twice the logarithm of the likelihood ratio, less the penalty for parameters; " +
       "a name needs 20. Explains: part of the squared error, weighted by each experiment's noise; errors are not weighted."));
     if (round.candidates.length > 8)
       s.append(folded(`${round.candidates.length - 8} more candidates`, false, (body) => body.append(candidateTable(round.candidates.slice(8), round.named, "The others, best first"))));

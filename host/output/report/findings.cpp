@@ -60,7 +60,7 @@ json headline(const std::string& signal, const std::string& unit, const std::str
 }
 
 std::string against_noise(double error, const std::optional<double>& noise) {
-  if (!noise || !(*noise > 0.0)) return "how large the noise of the measurement is is not known";
+  if (!noise || !(*noise > 0.0)) return "the noise of the measurement is not known";
   return error <= kAtNoise * *noise
              ? fmt::format("that is the noise of the measurement ({:.2f} times it)", error / *noise)
              : fmt::format("that is {:.3g} times what noise alone would leave", error / *noise);
@@ -89,12 +89,17 @@ json of_diagnosis(const selection::Diagnosis& d) {
   if (signal.empty()) return result;
   result["headline"] =
       headline(signal, d.unit, "on the fitted data", std::nullopt, d.base_rmse, d.noise_floor, d.noise_floor_from);
-  std::string sentence = fmt::format(" The error of the {} is {}; {}.", in_words(signal),
-                                     with_unit(d.base_rmse, d.unit), against_noise(d.base_rmse, d.noise_floor));
+  const std::string noise =
+      d.noise_floor || !d.noise_of_some
+          ? against_noise(d.base_rmse, d.noise_floor)
+          : fmt::format("the noise is known in {} only, where the error is {:.3g} times that",
+                        output::listed(d.noise_of_some->records), d.noise_of_some->rmse / d.noise_of_some->noise);
+  std::string sentence =
+      fmt::format(" The error of the {} is {}; {}.", in_words(signal), with_unit(d.base_rmse, d.unit), noise);
   if (d.verdict == selection::Verdict::missing_effect && !d.named.empty())
     for (const selection::Candidate& c : d.candidates) {
       if (c.effect != d.named.front().effect || c.order != d.named.front().order) continue;
-      const std::string on = "on data left out of the fit";
+      const std::string on = "in cross-validation";
       result["headline"] =
           headline(signal, d.unit, on, c.rmse_cv_before, c.rmse_cv_after, d.noise_floor, d.noise_floor_from);
       sentence += fmt::format(" With {}, the error {} decreases from {} to {}.", c.effect, on,

@@ -35,7 +35,7 @@ const before = report.comparison_before;
 const signalBefore = (name, signal) => before?.experiments.find((e) => e.name === name)?.signals.find((s) => s.signal === signal);
 
 const kNoiseSources = {
-  periods: "by what differs from period to period", replicates: "by what differs between repeated records",
+  periods: "from the differences between periods", replicates: "from the differences between repeated records",
   propagated: "stated noise and resolution, through the filters",
 };
 
@@ -99,7 +99,7 @@ function freeRunTable() {
   const signals = [...new Set(report.comparison.overall.filter((s) => !isBalance(s)).map((s) => s.signal))];
   if (!signals.length) return null;
   const unit = (signal) => unitText(report.comparison.overall.find((s) => s.signal === signal).unit);
-  return table("Free run: what the model does with the measured effort alone, from the measured start. Root mean square error; errors of positions sum up over time. In slow motion a small error of friction changes the motion much: an error that is large here and small in the balances above is that.",
+  return table("Free run: what the model does with the measured effort alone, from the measured start. Root mean square error; errors of positions sum up over time. In slow motion a small error of friction changes the motion much: where the error is large here and small in the balances above, that is the likely cause.",
     ["experiment", ...signals.map((s) => ({ n: `${signalName(s)} (${unit(s)})` }))],
     experiments.filter((e) => e.signals.some((s) => !isBalance(s))).map((e) => [el("span", {}, e.name, roleTag(e.role)), ...signals.map((signal) => {
       const s = e.signals.find((x) => x.signal === signal);
@@ -164,7 +164,7 @@ function fillExperiment(body, trace) {
   if (drawn.length) s.append(el("h3", {}, "Measured and modelled over time"));
   drawn.forEach((e, k) => {
     const excess = Math.max(...e.signals.filter(isBalance).map((x) => excessOf(x) ?? -1));
-    s.append(folded(el("span", {}, e.name, roleTag(e.role), excess >= 0 ? el("span", { class: "soft" }, `  error up to ${number(excess, 3)} times the noise`) : null),
+    s.append(folded(el("span", {}, e.name, roleTag(e.role), excess >= 0 ? el("span", { class: "soft" }, `  largest error of a balance ${number(excess, 3)} times its noise`) : null),
       k === 0, (body) => fillExperiment(body, traces.get(e.name))));
   });
   if (drawn.length > 1) s.append(el("p", { class: "paper-only soft" }, `Only the experiments that were open on the screen are printed (${drawn.length} in all).`));
