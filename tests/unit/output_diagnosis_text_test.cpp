@@ -64,8 +64,9 @@ Diagnosis with_disturbances(int count, double first_s = 0.0) {
 TEST(DiagnosisText, SaysBelowTheVerdictHowLargeTheNamedEffectIsAndWhetherThatIsSmall) {
   EXPECT_TRUE(contains(unwrapped(text_of(with_ripple(0.00077, 0.16))),
                        "The model lacks torque_ripple (2 per turn). torque_ripple (2 per turn): 0.00077 N*m (RMS), "
-                       "0.16 % of the rated torque, small. error"));
-  EXPECT_TRUE(contains(unwrapped(text_of(with_ripple(0.077, 16.0))), "(RMS), 16 % of the rated torque. error"));
+                       "0.16 % of the rated torque (0.481 N*m at the motor), small. error"));
+  EXPECT_TRUE(contains(unwrapped(text_of(with_ripple(0.077, 16.0))),
+                       "(RMS), 16 % of the rated torque (0.481 N*m at the motor). error"));
 }
 
 TEST(DiagnosisText, ShowsTheEightLargestDisturbancesInTheOrderOfTimeAndHowManyMoreThereAre) {

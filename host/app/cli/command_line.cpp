@@ -280,12 +280,11 @@ bool names_files(std::string_view value) {
 }
 
 OptionText::Takes what_it_takes(const CLI::Option& option, const OptionText& text) {
-  using Takes = OptionText::Takes;
   const std::string& kind = text.is_positional() ? text.name : text.value;
-  if (option.get_items_expected_max() == 0) return Takes::nothing;
-  if (!text.choices.empty()) return Takes::choice;
-  if (kind == "EFFECT" || (text.is_positional() && kind == "NAME")) return Takes::effect;
-  return names_files(kind) ? Takes::files : Takes::words;
+  if (option.get_items_expected_max() == 0) return OptionText::Takes::nothing;
+  if (!text.choices.empty()) return OptionText::Takes::choice;
+  if (kind == "EFFECT" || (text.is_positional() && kind == "NAME")) return OptionText::Takes::effect;
+  return names_files(kind) ? OptionText::Takes::files : OptionText::Takes::words;
 }
 
 OptionText text_of(const CLI::Option& option) {

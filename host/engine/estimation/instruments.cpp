@@ -16,7 +16,7 @@ namespace flexspline::estimation {
 namespace {
 
 constexpr int kFreeRuns = 3;
-constexpr int kSteps = 4;
+constexpr int kInstrumentSteps = 4;
 
 // Adds to a parameter, within its bounds.
 void move(const RegressionProblem& data, Terms& terms, const ParameterRef& ref, double by, bool nonlinear_ref) {
@@ -42,7 +42,7 @@ bool refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms
   const auto count = static_cast<Eigen::Index>(kept.size());
   const auto linear = static_cast<Eigen::Index>(fit.linear.size());
   Eigen::MatrixXd A(data.rows(), count), Z(data.rows(), count);
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step < kInstrumentSteps; ++step) {
     const Eigen::MatrixXd own = data.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear);
     Eigen::MatrixXd instruments = simulated.slopes(terms, fit.on_balance, fit.linear, fit.nonlinear);
     for (const RowRange& range : data.records())
@@ -66,7 +66,7 @@ bool refit(const RegressionProblem& data, const FreeMotion& motion, Terms& terms
       move(data, terms, refs[static_cast<std::size_t>(nonlinear_ref ? at - linear : at)], by[j] / size[j],
            nonlinear_ref);
     }
-    if (step + 1 < kSteps) continue;
+    if (step + 1 < kInstrumentSteps) continue;
     fit.residual = data.residual(terms);
     const Eigen::VectorXd weighted = fit.root_weights.cwiseProduct(fit.residual);
     fit.autocorrelation_time = autocorrelation_time(data, weighted);

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
+#include "host/common/algebra/root_mean_square.hpp"
 #include "host/engine/comparison/noise_floor.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/estimation/standard_intervals.hpp"
@@ -19,10 +19,6 @@ namespace {
 using estimation::Balance;
 using estimation::Identification;
 using estimation::RegressionProblem;
-
-double root_mean_square(const Eigen::VectorXd& r) {
-  return r.size() ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0.0;
-}
 
 // The balance on which an effect shows: its own, or the motor's where there is no torque sensor.
 const std::size_t* find_balance(const Identification& fitted, Balance own, std::size_t& found) {
@@ -78,8 +74,8 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   const Balance balance = base->data[b].balance();
   result.signal = std::string(balance_signal(balance));
   result.unit = before.drive.axis == data::Axis::linear ? "N" : "N*m";
-  result.before.rmse_fit = root_mean_square(base->data[b].residual(base->terms));
-  result.after.rmse_fit = root_mean_square(extended->data[x].residual(extended->terms));
+  result.before.rmse_fit = algebra::root_mean_square(base->data[b].residual(base->terms));
+  result.after.rmse_fit = algebra::root_mean_square(extended->data[x].residual(extended->terms));
   const HeldOut holdout(dataset, *base, balance, options.ready.get());
   std::vector<const data::Experiment*> fitted, evaluated;
   for (const data::Experiment& e : dataset.experiments)

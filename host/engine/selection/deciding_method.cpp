@@ -129,7 +129,7 @@ bool always(const BothMethods&) {
   return true;
 }
 
-constexpr auto kRules = std::to_array<DecidingRule>({
+constexpr auto kDecidingRules = std::to_array<DecidingRule>({
     {"nothing to resample", is_without_samples, Method::likelihood},
     {"too few samples for halves", has_too_few_samples, Method::resampling},
     {"likelihood names nothing", likelihood_names_nothing, Method::resampling},
@@ -149,12 +149,12 @@ constexpr auto kRules = std::to_array<DecidingRule>({
 }  // namespace
 
 std::span<const DecidingRule> deciding_rules() {
-  return kRules;
+  return kDecidingRules;
 }
 
 Method deciding_method(const Resampling& resampling, const SearchedBalance& motor) {
   const BothMethods both{resampling, motor};
-  return std::ranges::find_if(kRules, [&](const DecidingRule& rule) { return rule.applies(both); })->decides;
+  return std::ranges::find_if(kDecidingRules, [&](const DecidingRule& rule) { return rule.applies(both); })->decides;
 }
 
 bool stands_alone(const Resampling& resampling, std::span<const CandidateFit> candidates) {

@@ -79,6 +79,11 @@ double torque_explained(const BalanceSearch& own, const CandidateFit& t) {
   return std::sqrt(std::max(0.0, std::pow(own.base.rmse_fixed_effects(), 2) - std::pow(t.fit.rmse_fixed_effects(), 2)));
 }
 
+// An encoder's error is in the torsion alone: what explains most of another torque balance as well is none.
+bool shows_on_others(const CandidateFit& t) {
+  return t.other_balance_score > kPolicy.named_score && t.other_balance_percent >= 100.0 * kPolicy.most_share;
+}
+
 bool is_same(const CandidateFit& a, const CandidateFit& b) {
   return a.model.entry == b.model.entry && a.model.order == b.model.order;
 }
@@ -111,7 +116,7 @@ void check_encoder_errors(const BalanceSearch& own, std::vector<CandidateFit>& c
                        [&](const CandidateFit& t) { return is_checked(t) && t.model.entry == model.entry; });
   });
   for (CandidateFit& t : candidates) {
-    if (!is_checked(t)) continue;
+    if (!is_checked(t) || shows_on_others(t)) continue;
     const auto at = std::find_if(again.begin(), again.end(), [&](const CandidateFit& a) { return is_same(a, t); });
     if (at != again.end() && is_worth_a_term(behind, *at)) continue;
     t.admissible = false;

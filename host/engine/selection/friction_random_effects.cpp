@@ -63,9 +63,12 @@ Eigen::VectorXd friction_effects_of(const RegressorTable& table, const Setting& 
     records.push_back(std::move(r));
   }
   // Columns of the table are scaled; one unit is the friction over that scale.
+  const estimation::VariancePrior prior =
+      records.size() < policy.records_without_prior
+          ? estimation::VariancePrior{policy.friction_difference, policy.friction_difference_records}
+          : estimation::VariancePrior{};
   const Eigen::VectorXd variance =
-      estimation::reml(records, noise, policy.least_friction_difference, policy.most_friction_difference,
-                       {policy.friction_difference, policy.friction_difference_records})
+      estimation::reml(records, noise, policy.least_friction_difference, policy.most_friction_difference, prior)
           .variance;
   return variance.cwiseProduct(size.cwiseAbs2());
 }

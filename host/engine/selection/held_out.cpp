@@ -2,21 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
+#include "host/common/algebra/root_mean_square.hpp"
 #include "host/engine/estimation/modelled_current.hpp"
 #include "host/engine/estimation/modelled_torque.hpp"
 #include "host/engine/selection/policy.hpp"
 
 namespace flexspline::selection {
-
-namespace {
-
-double root_mean_square(const Eigen::VectorXd& x) {
-  return x.size() > 0 ? std::sqrt(x.squaredNorm() / static_cast<double>(x.size())) : 0.0;
-}
-
-}  // namespace
 
 HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification& fitted, estimation::Balance balance,
                  const estimation::PreparedData* ready) {
@@ -34,13 +25,13 @@ HeldOut::HeldOut(const data::Dataset& dataset, const estimation::Identification&
 double HeldOut::rmse(const Terms& terms) const {
   std::optional<RegressionProblem> with_load;
   estimation::PreparedData own;
-  return root_mean_square(data_for(terms, own, with_load).residual(terms));
+  return algebra::root_mean_square(data_for(terms, own, with_load).residual(terms));
 }
 
 double HeldOut::rms_torque(const Terms& terms, std::size_t term) const {
   std::optional<RegressionProblem> with_load;
   estimation::PreparedData own;
-  return root_mean_square(data_for(terms, own, with_load).term_torque(terms, term));
+  return algebra::root_mean_square(data_for(terms, own, with_load).term_torque(terms, term));
 }
 
 // Where no torque is measured, a law of it reads that of the load.

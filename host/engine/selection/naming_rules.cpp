@@ -189,7 +189,7 @@ std::string is_not_certain(const FoundOnMotor& e) {
   return how_held_out_falls(e.found);
 }
 
-constexpr auto kRules = std::to_array<NamingRule>({
+constexpr auto kNamingRules = std::to_array<NamingRule>({
     {"held-out error does not rise", does_not_raise_held_out_error, raises_held_out_error},
     {"most subsamples, held-out error or likelihood", is_supported, is_not_supported},
     {"few records: held-out error or likelihood", holds_beyond_few_records, does_not_hold_beyond_few_records},
@@ -207,12 +207,12 @@ constexpr auto kRules = std::to_array<NamingRule>({
 }  // namespace
 
 std::span<const NamingRule> naming_rules() {
-  return kRules;
+  return kNamingRules;
 }
 
 const NamingRule* broken_rule(const FoundOnMotor& effect) {
-  const auto broken = std::ranges::find_if(kRules, [&](const NamingRule& rule) { return !rule.is_kept(effect); });
-  return broken == kRules.end() ? nullptr : &*broken;
+  const auto broken = std::ranges::find_if(kNamingRules, [&](const NamingRule& rule) { return !rule.is_kept(effect); });
+  return broken == kNamingRules.end() ? nullptr : &*broken;
 }
 
 std::string held_out_rise(const Resampling::FoundTerm& found) {

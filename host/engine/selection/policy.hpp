@@ -89,6 +89,9 @@ struct SelectionPolicy {
   // Friction of one drive differs between runs by 0 to 10 %, by 3 % mostly: a prior worth that many records.
   double friction_difference = 0.03;
   double friction_difference_records = 2.0;
+  // From so many records on the prior is left out: they determine that standard deviation to 27 % (1/sqrt(2(n - 1))),
+  // and with it friction that does not differ would count as differing by 1 %, which hides what is that small.
+  std::size_t records_without_prior = 8;
   double least_friction_difference = 0.005;
   double most_friction_difference = 0.5;
 

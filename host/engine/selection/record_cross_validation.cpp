@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMostFolds = 6;
 // Relative change of the squares that ends the search for nonlinear parameters: far below what decides.
-constexpr double kSameSquares = 1e-4;
+constexpr double kSameSquaresOfRecords = 1e-4;
 
 // A model fitted on the samples in `keep`; nonlinear parameters start at the values from all records.
 CrossValidatedFit fit_without(const RegressionProblem& data, const Terms& terms, const Eigen::VectorXd& keep) {
@@ -23,7 +23,7 @@ CrossValidatedFit fit_without(const RegressionProblem& data, const Terms& terms,
   const auto on_balance = estimation::terms_on(fit.terms, data.balance(), data.prepared().output_signals);
   if (estimation::free_nonlinear_parameters(fit.terms, on_balance).empty()) return fit;
   Terms refined = fit.terms;
-  estimation::refine_nonlinear(data, refined, on_balance, noise_covariance(data, fit), kSameSquares);
+  estimation::refine_nonlinear(data, refined, on_balance, noise_covariance(data, fit), kSameSquaresOfRecords);
   return cross_validate(data, std::move(refined), keep);
 }
 

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "host/common/algebra/root_mean_square.hpp"
 #include "host/common/numbers/quantile.hpp"
 #include "host/engine/estimation/in_parallel.hpp"
 #include "host/engine/selection/presliding.hpp"
@@ -61,8 +62,9 @@ void add_row_signals(const TableBuilder& builder) {
   }
 }
 
-double root_mean_square(const Eigen::VectorXd& column) {
-  const double size = column.norm() / std::sqrt(std::max<double>(1.0, static_cast<double>(column.size())));
+// What a column is divided by.
+double unit_of(const Eigen::VectorXd& column) {
+  const double size = algebra::root_mean_square(column);
   return size > 0.0 && std::isfinite(size) ? size : 1.0;
 }
 
@@ -74,7 +76,7 @@ void scale_columns(const TableBuilder& builder) {
   table.scale.resize(std::ssize(builder.columns));
   estimation::in_parallel(builder.columns.size(), [&](std::size_t i) {
     const auto j = static_cast<Eigen::Index>(i);
-    table.scale[j] = root_mean_square(builder.columns[i]);
+    table.scale[j] = unit_of(builder.columns[i]);
     table.columns.col(j) = builder.columns[i] / table.scale[j];
   });
   for (CandidateTerm& term : table.terms)
@@ -87,8 +89,7 @@ void scale_columns(const TableBuilder& builder) {
     presliding.columns.col(i) = builder.presliding_columns[static_cast<std::size_t>(i)] /
                                 table.scale[presliding.instead_of[static_cast<std::size_t>(i)]];
   for (std::size_t i = 0; i < builder.shapes.size(); ++i)
-    presliding.columns.col(differ + static_cast<Eigen::Index>(i)) =
-        builder.shapes[i] / root_mean_square(builder.shapes[i]);
+    presliding.columns.col(differ + static_cast<Eigen::Index>(i)) = builder.shapes[i] / unit_of(builder.shapes[i]);
 }
 
 }  // namespace

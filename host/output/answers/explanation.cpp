@@ -79,10 +79,14 @@ std::string rms_in_words(const selection::EffectSize& size, const std::string& u
   return fmt::format("{} {} (RMS)", number(size.rms), unit);
 }
 
-// "; 0.16 % of the rated torque"; empty where that is not stated.
-std::string share_of_rated(const selection::EffectSize& size, std::string_view joint) {
-  if (!size.percent_of_rated) return "";
-  return fmt::format("{}{} % of the rated torque", joint, number(*size.percent_of_rated, 2));
+// "; 0.16 % of the rated torque (0.48 N*m at the motor)"; empty where that is not stated.
+std::string share_of_rated(const Candidate& c, const std::string& unit, std::string_view joint) {
+  const std::optional<double> percent = c.size->percent_of_rated;
+  if (!percent) return "";
+  const std::string share = fmt::format("{}{} % of the rated torque", joint, number(*percent, 2));
+  if (!(*percent > 0.0)) return share;
+  return fmt::format("{} ({} {}{})", share, number(c.size->rms / (0.01 * *percent), 3), unit,
+                     c.balance == estimation::Balance::motor ? " at the motor" : "");
 }
 
 // On which side of the gear the values of an effect are, whichever balance shows it.
@@ -122,7 +126,7 @@ std::string size_in_words(const Candidate& c, const std::string& unit) {
   constexpr double kSmallPercent = 0.5;
   if (!c.size) return "";
   return fmt::format("{}: {}{}{}", effect_in_words(c.effect, c.order), rms_in_words(*c.size, unit),
-                     share_of_rated(*c.size, ", "),
+                     share_of_rated(c, unit, ", "),
                      c.size->percent_of_rated && *c.size->percent_of_rated < kSmallPercent ? ", small" : "");
 }
 
@@ -146,7 +150,7 @@ void print_explanation(Console& console, const Candidate& c, const std::string& 
     console.line(wrapped(words_on(
         axis_of(unit),
         fmt::format("The part of its torque that the other effects of the model cannot replace: {}, {} at most{}.",
-                    rms_in_words(*c.size, unit), number(c.size->peak), share_of_rated(*c.size, "; ")))));
+                    rms_in_words(*c.size, unit), number(c.size->peak), share_of_rated(c, unit, "; ")))));
   print("", c.note);
   if (c.evidence && !c.evidence->bins.empty()) print_map(console, *c.evidence, unit);
   print("What it does: ", info.consequence);

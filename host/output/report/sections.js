@@ -144,7 +144,7 @@ function fillExperiment(body, trace) {
     body.append(timePlot(linked, b.before ? ["error before", "error after"] : ["error (measured less model)"], b.before ? ["before", "residual"] : ["residual"], unit, [time, ...series], {
       height: 160, noise: b.noise_floor, zero: true,
       label: `Error of the ${name} of ${trace.experiment} over time; noise alone ${withUnit(b.noise_floor, unit)}`,
-      caption: "Gaps are reversals and sticking, which are left out of the error." }));
+      caption: series.some((values) => values.some((v) => v === null || Number.isNaN(v))) ? "Gaps are reversals and sticking, which are left out of the error." : undefined }));
   }
   for (const f of trace.free_runs) {
     const name = signalName(f.signal);
@@ -376,7 +376,7 @@ if (report.parameters.length) {
   const s = section("Parameters of the model");
   const spreads = report.parameters.some((p) => p.spread_percent !== null);
   const remark = (p) => (!p.identifiable ? "these data do not identify it" : p.reliable === false ? "unreliable: differs from experiment to experiment by more than 30 %" : "") +
-    (p.left_out ? `${!p.identifiable || p.reliable === false ? "; " : ""}${p.counted} of ${p.counted + p.left_out} experiments determine it alone` : "");
+    (p.left_out ? `${!p.identifiable || p.reliable === false ? "; " : ""}${p.counted} of ${p.counted + p.left_out} experiments identify it when each is fitted alone` : "");
   s.append(table("Values with 95 % intervals" + (spreads ? ", and how much they differ from experiment to experiment (standard deviation over average)" : "") +
     ". An interval holds for this model; while an effect is missing, the true value may lie outside.",
     ["parameter", { n: "value" }, { n: "95 % interval" }, "unit", { n: "spread" }, ""],
