@@ -95,6 +95,23 @@ TEST(DecidingMethod, IsResamplingWhereHalvesFoundOtherEffectsOnly) {
   EXPECT_EQ(deciding_method(others, motor), Method::resampling);
 }
 
+// The likelier one has a state, which halves are not offered, and the other one is a special case of it.
+TEST(DecidingMethod, IsLikelihoodForALawWithMemoryThatContainsWhatHalvesFound) {
+  SearchedBalance motor = motor_with("driving_dependent_loss");
+  motor.candidates.push_back(motor.candidates.front());
+  CandidateFit& special = motor.candidates.back();
+  special.model.entry = &catalogue::get("load_dependent_friction");
+  special.gain.score -= kPolicy.confounded_margin + 1.0;
+  Resampling halves = halves_that_chose("load_dependent_friction", 0.9);
+  halves.found = {found("load_dependent_friction")};
+  EXPECT_EQ(deciding_method(halves, motor), Method::likelihood);
+  halves.found.push_back(found("coulomb_asymmetry"));
+  EXPECT_EQ(deciding_method(halves, motor), Method::resampling) << "it does not contain the other one";
+  halves.found.pop_back();
+  special.gain.score += 2.0;
+  EXPECT_EQ(deciding_method(halves, motor), Method::resampling) << "they are about as likely";
+}
+
 TEST(DecidingMethod, IsResamplingWhereHalvesDidNotChooseTheLikeliestUnlessMostAbstained) {
   SearchedBalance motor = motor_near_noise_with("quadratic_drag");
   Resampling few = halves_that_chose("quadratic_drag", kPolicy.named_frequency - 0.1);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "host/common/algebra/root_mean_square.hpp"
 #include "host/engine/comparison/noise_floor.hpp"
@@ -52,6 +53,30 @@ std::string reversals_are_evaluated(const Addition& change) {
       change.after.rmse_holdout.value_or(change.after.rmse_fit), change.unit);
 }
 
+// Nothing; or the interval, "0.08 to 36 N*m", of a parameter that the data determine to less than its own size.
+std::optional<std::string> wide_interval(const estimation::Estimate& e) {
+  if (e.fixed) return std::nullopt;
+  if (!e.identifiable || !e.low || !e.high) return "none";
+  if (*e.high - *e.low <= 2.0 * std::abs(e.value)) return std::nullopt;
+  return fmt::format("{:.3g} to {:.3g} {}", *e.low, *e.high, e.unit);
+}
+
+// Parameters that the data determine without the effect, and hardly with it.
+void warn_of_undetermined(const std::vector<estimation::Estimate>& before, Addition& change) {
+  for (const estimation::Estimate& e : change.estimates) {
+    const auto was = std::ranges::find_if(
+        before, [&](const estimation::Estimate& b) { return b.id == e.id && b.parameter == e.parameter; });
+    const std::optional<std::string> wide = wide_interval(e);
+    if (!wide || was == before.end() || was->fixed || wide_interval(*was)) continue;
+    change.warnings.push_back(fmt::format(
+        "these data determine {}.{} without {} ({:.3g} to {:.3g} {}) but hardly with it (95 % interval: {}), as the "
+        "two "
+        "look much alike in them: fix the parameter in the model file if it is known, or record other motions "
+        "(`flexspline plan` designs them)",
+        e.id, e.parameter, change.effect, *was->low, *was->high, e.unit, *wide));
+  }
+}
+
 Addition compare_models(const data::Dataset& dataset, const model::Model& before, const model::Model& after,
                         Balance own, std::string effect, std::string action,
                         const estimation::PipelineOptions& stated) {
@@ -98,6 +123,7 @@ Addition compare_models(const data::Dataset& dataset, const model::Model& before
   result.estimates = extended->estimates;
   result.tables = extended->tables;
   result.warnings = extended->warnings;
+  if (action == "add") warn_of_undetermined(base->estimates, result);
   if (options.mask && balance == Balance::motor &&
       estimation::has_presliding(before) != estimation::has_presliding(after))
     result.warnings.push_back(reversals_are_evaluated(result));

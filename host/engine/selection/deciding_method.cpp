@@ -92,6 +92,20 @@ bool unseen_by_halves_stands_alone(const BothMethods& b) {
   return !support(b) && stands_alone(b.resampling, b.motor.candidates);
 }
 
+// A law with memory, which halves are not offered: all that they chose are special cases of it that explain less.
+bool unseen_contains_what_halves_found(const BothMethods& b) {
+  const CandidateFit& best = likeliest(b);
+  const auto is_contained = [&](const NamedEffect& name) {
+    const CandidateFit* own = candidate_named(b.motor, name);
+    return own && catalogue::names_contain(best.model.entry->info->contains, name.effect) &&
+           own->gain.score + kPolicy.confounded_margin < best.gain.score;
+  };
+  return best.model.entry->has_state && !support(b) && !b.resampling.found.empty() &&
+         std::ranges::all_of(b.resampling.found, [&](const Resampling::FoundTerm& found) {
+           return !found.group.empty() && std::ranges::all_of(found.group, is_contained);
+         });
+}
+
 bool halves_found_others_only(const BothMethods& b) {
   return !b.resampling.found.empty() && std::ranges::none_of(b.resampling.found, [&](const auto& found) {
     return contains_family(found.group, likeliest(b));
@@ -138,6 +152,7 @@ constexpr auto kDecidingRules = std::to_array<DecidingRule>({
     {"the likeliest effect is presliding", likeliest_is_presliding, Method::resampling},
     {"halves cannot choose it, and it explains nearly all", unseen_by_halves_takes_off_nearly_all, Method::likelihood},
     {"halves cannot choose it, and find nothing", unseen_by_halves_stands_alone, Method::likelihood},
+    {"halves cannot choose it, and it contains what they found", unseen_contains_what_halves_found, Method::likelihood},
     {"halves found other effects only", halves_found_others_only, Method::resampling},
     {"halves name several effects", halves_name_several, Method::resampling},
     {"halves did not choose the likeliest effect", halves_did_not_choose_likeliest, Method::resampling},
