@@ -48,7 +48,7 @@ CrossValidatedFit with_encoder_errors(const BalanceSearch& own) {
 // Torque that the encoders' steps make where the gear were a spring alone.
 struct TorqueOfSteps {
   double rms = 0.0;
-  double largest = 0.0;  // of both angles, each off by a step
+  double largest = 0.0;  // of both angles rounded by half a step
 };
 
 TorqueOfSteps torque_of_steps(const RegressionProblem& data) {
@@ -71,7 +71,7 @@ TorqueOfSteps torque_of_steps(const RegressionProblem& data) {
   if (torsion == variables.end() || !torsion->values.allFinite()) return {};
   const Eigen::VectorXd x = torsion->values.array() - torsion->values.mean();
   const double stiffness = std::abs(x.dot(data.target())) / std::max(x.squaredNorm(), 1e-300);
-  return {stiffness * rms, stiffness * (motor_step + output_step)};
+  return {stiffness * rms, stiffness * 0.5 * (motor_step + output_step)};
 }
 
 // RMS torque that a candidate takes off the residual.
@@ -93,12 +93,11 @@ bool is_same(const CandidateFit& a, const CandidateFit& b) {
 void check_encoder_errors(const BalanceSearch& own, std::vector<CandidateFit>& candidates) {
   if (own.data->balance() != estimation::Balance::transmission) return;
   const TorqueOfSteps steps = torque_of_steps(*own.data);
-  // A constant does not average out as a loop does: a counter that cuts off its steps is off by half a step all the
-  // time, and by up to another half as it is set to zero somewhere within one.
+  // A constant does not average out as a loop does: rounded angles may be off by as much all the time.
   for (CandidateFit& t : candidates) {
     if (!passes(t) || !is_each_records_own(*t.model.entry) || torque_explained(own, t) >= steps.largest) continue;
     t.admissible = false;
-    t.why_not = "it is smaller than a step of the encoders";
+    t.why_not = "it is smaller than half a step of the encoders";
   }
   sort_candidates(own, candidates);
   const auto is_checked = [](const CandidateFit& t) {
