@@ -8,6 +8,7 @@
 
 #include "host/engine/selection/add.hpp"
 #include "host/engine/selection/candidate_models.hpp"
+#include "tests/support/written_experiment.hpp"
 
 namespace flexspline::selection::selection_edits_test {
 namespace {
@@ -185,19 +186,12 @@ class Edit : public ::testing::Test {
 TEST(EditOfOneSpeed, WarnsOfAParameterThatTheDataHardlyDetermineWithTheEffect) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0.0, 0.002);
-  data::Experiment e;
-  e.name = "triangle";
-  e.sample_s = 1e-3;
-  e.current_hold = data::CurrentHold::none;
-  for (std::size_t k = 0; k < 8000; ++k) {
-    const double t = 1e-3 * static_cast<double>(k), phase = 2.0 * kPi * 0.5 * t;
-    e.time_s.push_back(t);
+  data::Dataset dataset;
+  dataset.experiments = {tests::written_experiment("triangle", 1e-3, 8000, [&](double t, data::Experiment& e) {
+    const double phase = 2.0 * kPi * 0.5 * t;
     e[Column::motor_position].push_back(20.0 / kPi * std::asin(std::sin(phase)));
     e[Column::motor_torque].push_back(kViscous * std::copysign(20.0, std::cos(phase)) + noise(random));
-  }
-  e.segments = {{0, e.size()}};
-  data::Dataset dataset;
-  dataset.experiments = {std::move(e)};
+  })};
   const auto warns = [&](const char* effect) {
     const Addition added = add(dataset, model_of({"viscous_friction"}), effect, kOptions);
     return std::ranges::any_of(added.warnings, [](const std::string& w) {
